@@ -1,0 +1,24 @@
+"""dapple: from laser scans to the light under the tree."""
+
+from snakemake.utils import min_version
+
+min_version("9.0")
+
+
+configfile: "config/config.yaml"
+
+
+include: "rules/common.smk"
+include: "rules/scan.smk"
+include: "rules/cloud.smk"
+include: "rules/structure.smk"
+include: "rules/sky.smk"
+include: "rules/light.smk"
+include: "rules/statistics.smk"
+include: "rules/figures.smk"
+
+
+rule all:
+    default_target: True
+    input:
+        targets(),

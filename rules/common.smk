@@ -1,0 +1,110 @@
+"""
+Configuration, names of files, and what every rule shares. No rules here.
+
+Needs   config/config.yaml, merged with the file given as --configfile
+Makes   results/{experiment}/config.yaml     the merged configuration of this run
+"""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(workflow.basedir) / "scripts"))
+
+from dapple import workflow as dapple_workflow
+from dapple.config import validate
+from dapple.errors import InputError
+from dapple.light.times import label, time_range
+from dapple.streams import stream_seed
+
+try:
+    settings = validate(config, " + ".join(str(file) for file in workflow.configfiles))
+    TIMES = [label(time) for time in time_range(**dict(settings.time))]
+except InputError as error:
+    sys.exit(f"dapple: {error}")
+
+PLACEMENTS = range(settings.leaves.placements if settings.source == "wood" else 1)
+VOXELS = [name for name in settings.reconstructions if name.startswith("voxels_")]
+LIT = settings.reconstructions if settings.sensors.kind != "none" else ()
+COMPARED = LIT if settings.measured.kind != "none" else ()
+
+
+wildcard_constraints:
+    reconstruction=r"polygons|truth|voxels_[0-9.]+",
+    meshed=r"polygons|truth",
+    size=r"[0-9.]+",
+    placement=r"[0-9]+",
+
+
+def results(path):
+    """A file of this experiment."""
+    return f"results/{settings.experiment}/{path}"
+
+
+def logs(name):
+    """The log of a rule."""
+    return results(f"logs/{name}.log")
+
+
+def benchmarks(name):
+    """The time and memory that a rule took."""
+    return results(f"benchmarks/{name}.tsv")
+
+
+def code(script):
+    """The modules that a script is made of: an edit reruns the rule."""
+    return dapple_workflow.code_of(Path(workflow.basedir) / "scripts" / f"{script}.py")
+
+
+def data(path):
+    """A file of real data, which the configuration names relative to data_dir."""
+    file = Path(settings.data_dir) / path
+    if not file.is_file():
+        sys.exit(
+            f"dapple: {file}: found no such file; expected the data that `{settings.experiment}` "
+            "reads. Set data_dir in the configuration to the folder that has it."
+        )
+    return str(file)
+
+
+def stream(*names):
+    """The seed of one stage."""
+    return stream_seed(settings.seed, *names)
+
+
+def leaf_meshes(reconstruction):
+    """The leaves of a reconstruction made of polygons, one file a placement."""
+    return [results(f"structure/{reconstruction}/leaves_{p}.ply") for p in PLACEMENTS]
+
+
+def leaf_geometry(wildcards):
+    """The leaves that light meets: meshes or a voxel grid."""
+    name = wildcards.reconstruction
+    if name.startswith("voxels_"):
+        return [results(f"structure/{name}/voxels.nc")]
+    return leaf_meshes(name)
+
+
+def wood_mesh(wildcards):
+    """The wood that light meets: the truth's in the truth, else the polygons'."""
+    meshed = "truth" if wildcards.reconstruction == "truth" else "polygons"
+    return results(f"structure/{meshed}/wood.ply")
+
+
+def targets():
+    """What a plain run makes."""
+    wanted = ["config.yaml", "classes/scores.json"]
+    wanted += [f"structure/{name}/summary.json" for name in settings.reconstructions]
+    wanted += [f"structure/{name}/voxels.vox" for name in VOXELS]
+    if "polygons" in settings.reconstructions and settings.source != "wood":
+        wanted += ["structure/polygons/distance.json"]
+    if LIT:
+        wanted += [f"light/{name}.nc" for name in LIT]
+        wanted += ["figures/tree.png", "figures/ground_map.png", "figures/series.png"]
+    if COMPARED:
+        wanted += ["statistics/overall.csv", "statistics/per_sensor.csv"]
+        wanted += [
+            "statistics/mixed_model.csv",
+            "figures/boxplot.png",
+            "figures/scatter.png",
+        ]
+    return [results(path) for path in [*wanted, "runtime.csv", "report.html"]]

@@ -1,0 +1,189 @@
+"""
+Scan: where points and shots come from.
+
+Needs   nothing (source: virtual), wood polygons (source: wood) or a point cloud (source: cloud)
+Makes   config.yaml                       the merged configuration
+        structure/truth/*.ply             virtual: the tree itself, leaf and wood area known
+        structure/polygons/*.ply          wood: real wood, virtual leaves along it
+        scan/points.laz                   points with reflectance and deviation, where known
+        scan/shots.parquet                every shot with its returns, misses included
+"""
+
+
+rule configuration:
+    input:
+        code=code("configuration"),
+    output:
+        results("config.yaml"),
+    log:
+        logs("configuration"),
+    benchmark:
+        benchmarks("configuration")
+    conda:
+        "../envs/dapple.yaml"
+    threads: 1
+    resources:
+        mem_mb=200,
+    params:
+        settings=settings.model_dump(mode="json"),
+    message:
+        "{settings.experiment}: the merged configuration"
+    script:
+        "../scripts/configuration.py"
+
+
+if settings.source == "virtual":
+
+    rule plant:
+        input:
+            code=code("plant"),
+        output:
+            leaves=results("structure/truth/leaves_0.ply"),
+            wood=results("structure/truth/wood.ply"),
+            summary=results("structure/truth/summary.json"),
+        log:
+            logs("plant"),
+        benchmark:
+            benchmarks("plant")
+        conda:
+            "../envs/dapple.yaml"
+        threads: 1
+        resources:
+            mem_mb=2000,
+        params:
+            **dict(settings.plant),
+            seed=stream("plant"),
+        message:
+            "{settings.experiment}: grow a virtual apple tree"
+        script:
+            "../scripts/plant.py"
+
+
+if settings.source == "wood":
+
+    rule real_wood:
+        input:
+            obj=data(settings.wood_path),
+            code=code("real_wood"),
+        output:
+            wood=results("structure/polygons/wood.ply"),
+        log:
+            logs("real_wood"),
+        benchmark:
+            benchmarks("real_wood")
+        conda:
+            "../envs/dapple.yaml"
+        threads: 1
+        resources:
+            mem_mb=500,
+        message:
+            "{settings.experiment}: wood polygons of {input.obj}"
+        script:
+            "../scripts/real_wood.py"
+
+    rule virtual_leaves:
+        input:
+            wood=results("structure/polygons/wood.ply"),
+            code=code("virtual_leaves"),
+        output:
+            leaves=results("structure/polygons/leaves_{placement}.ply"),
+        log:
+            logs("virtual_leaves_{placement}"),
+        benchmark:
+            benchmarks("virtual_leaves_{placement}")
+        conda:
+            "../envs/dapple.yaml"
+        threads: 1
+        resources:
+            mem_mb=2000,
+        params:
+            **settings.leaves.model_dump(exclude={"placements"}),
+            seed=lambda wildcards: stream("virtual_leaves", wildcards.placement),
+        message:
+            "{settings.experiment}: leaves along the real wood, placement {wildcards.placement}"
+        script:
+            "../scripts/virtual_leaves.py"
+
+    rule virtual_leaves_summary:
+        input:
+            leaves=leaf_meshes("polygons"),
+            wood=results("structure/polygons/wood.ply"),
+            code=code("virtual_leaves_summary"),
+        output:
+            summary=results("structure/polygons/summary.json"),
+        log:
+            logs("virtual_leaves_summary"),
+        benchmark:
+            benchmarks("virtual_leaves_summary")
+        conda:
+            "../envs/dapple.yaml"
+        threads: 1
+        resources:
+            mem_mb=1000,
+        message:
+            "{settings.experiment}: areas of the real wood and its virtual leaves"
+        script:
+            "../scripts/virtual_leaves_summary.py"
+
+
+if settings.source == "cloud":
+
+    rule ingest:
+        input:
+            cloud=data(settings.cloud.path),
+            positions=(
+                data(settings.cloud.scan_positions)
+                if settings.cloud.scan_positions
+                else []
+            ),
+            code=code("ingest"),
+        output:
+            points=results("scan/points.laz"),
+            shots=(
+                results("scan/shots.parquet") if settings.cloud.shots != "none" else []
+            ),
+        log:
+            logs("ingest"),
+        benchmark:
+            benchmarks("ingest")
+        conda:
+            "../envs/dapple.yaml"
+        threads: 1
+        resources:
+            mem_mb=4000,
+        params:
+            shots=settings.cloud.shots,
+            scan_frame=settings.scan_frame.model_dump(),
+        message:
+            "{settings.experiment}: read {input.cloud}"
+        script:
+            "../scripts/ingest.py"
+
+else:
+    SCANNED = "truth" if settings.source == "virtual" else "polygons"
+
+    rule scan:
+        input:
+            leaves=results(f"structure/{SCANNED}/leaves_0.ply"),
+            wood=results(f"structure/{SCANNED}/wood.ply"),
+            code=code("scan"),
+        output:
+            points=results("scan/points.laz"),
+            shots=results("scan/shots.parquet"),
+        log:
+            logs("scan"),
+        benchmark:
+            benchmarks("scan")
+        conda:
+            "../envs/dapple.yaml"
+        threads: 2
+        resources:
+            mem_mb=4000,
+        params:
+            **dict(settings.scan),
+            seed=stream("scan"),
+            variant=settings.light.variant,
+        message:
+            "{settings.experiment}: scan the tree from {params.positions} positions"
+        script:
+            "../scripts/scan.py"

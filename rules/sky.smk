@@ -1,0 +1,92 @@
+"""
+Sky: what light reaches the tree, and what leaf, bark and meadow do with it.
+
+Needs   the configuration; with radiation.kind: table, global and diffuse irradiance
+Makes   sky/sky.nc         sun, direct and diffuse photon flux per band, sky radiance coefficients
+        sky/optics.nc      reflectance and transmittance per band
+        sky/sensors.csv    the sensors in the local frame
+"""
+
+
+rule sky:
+    input:
+        radiation=(
+            data(settings.radiation.path) if settings.radiation.kind == "table" else []
+        ),
+        registration=results("registration/registration.json"),
+        code=code("sky"),
+    output:
+        sky=results("sky/sky.nc"),
+    log:
+        logs("sky"),
+    benchmark:
+        benchmarks("sky")
+    conda:
+        "../envs/dapple.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        site=dict(settings.site),
+        time=dict(settings.time),
+        n_times=len(TIMES),
+        radiation=settings.radiation.model_dump(exclude={"path"}),
+    message:
+        "{settings.experiment}: sun and sky at {params.n_times} times"
+    script:
+        "../scripts/sky.py"
+
+
+rule optics:
+    input:
+        tables=[
+            data(s.path)
+            for s in (settings.optics.bark, settings.optics.ground)
+            if s.path
+        ],
+        code=code("optics"),
+    output:
+        optics=results("sky/optics.nc"),
+    log:
+        logs("optics"),
+    benchmark:
+        benchmarks("optics")
+    conda:
+        "../envs/dapple.yaml"
+    threads: 1
+    resources:
+        mem_mb=500,
+    params:
+        optics=settings.optics.model_dump(),
+        data_dir=settings.data_dir,
+    message:
+        "{settings.experiment}: spectra of leaf, bark and ground"
+    script:
+        "../scripts/optics.py"
+
+
+rule sensors:
+    input:
+        table=data(settings.sensors.path) if settings.sensors.kind == "table" else [],
+        registration=results("registration/registration.json"),
+        leaves=leaf_meshes("polygons"),
+        wood=results("structure/polygons/wood.ply"),
+        code=code("sensors"),
+    output:
+        sensors=results("sky/sensors.csv"),
+    log:
+        logs("sensors"),
+    benchmark:
+        benchmarks("sensors")
+    conda:
+        "../envs/dapple.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        **settings.sensors.model_dump(exclude={"path"}),
+        ground_z_m=settings.cloud.ground_z_m if settings.source == "cloud" else 0.0,
+    message:
+        "{settings.experiment}: sensors in the local frame"
+    script:
+        "../scripts/sensors.py"

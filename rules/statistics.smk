@@ -1,0 +1,98 @@
+"""
+Statistics: how well simulated light matches measured light, and what it cost.
+
+Needs   light/{reconstruction}.nc and the records, or the virtual truth
+Makes   statistics/records.csv        measured and simulated PAR side by side, fitting and reporting part named
+        statistics/overall.csv        one line a reconstruction, reporting part only
+        statistics/per_sensor.csv     one line a sensor
+        statistics/mixed_model.csv    measured on simulated light, sensor as random effect
+        runtime.csv                   time and memory of every step
+"""
+
+
+rule records:
+    input:
+        light=[results(f"light/{name}.nc") for name in COMPARED],
+        truth=results("light/truth.nc") if settings.measured.kind == "virtual" else [],
+        measured=(
+            data(settings.measured.path) if settings.measured.kind == "table" else []
+        ),
+        sky=results("sky/sky.nc"),
+        registration=results("registration/registration.json"),
+        code=code("records"),
+    output:
+        records=results("statistics/records.csv"),
+    log:
+        logs("records"),
+    benchmark:
+        benchmarks("records")
+    conda:
+        "../envs/dapple.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        **settings.measured.model_dump(exclude={"path"}),
+        reconstructions=COMPARED,
+        seed=stream("records"),
+    message:
+        "{settings.experiment}: measured beside simulated light"
+    script:
+        "../scripts/records.py"
+
+
+rule statistics:
+    input:
+        records=results("statistics/records.csv"),
+        code=code("statistics"),
+    output:
+        overall=report(
+            results("statistics/overall.csv"),
+            caption="../docs/captions/overall.rst",
+            category="Statistics",
+        ),
+        per_sensor=results("statistics/per_sensor.csv"),
+        mixed_model=results("statistics/mixed_model.csv"),
+    log:
+        logs("statistics"),
+    benchmark:
+        benchmarks("statistics")
+    conda:
+        "../envs/statistics.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        **dict(settings.statistics),
+        seed=stream("statistics"),
+    message:
+        "{settings.experiment}: correlation, error, bias"
+    script:
+        "../scripts/statistics.py"
+
+
+rule runtime:
+    input:
+        made=[
+            path
+            for path in targets()
+            if not path.endswith(("runtime.csv", "report.html"))
+        ],
+        code=code("runtime"),
+    output:
+        runtime=results("runtime.csv"),
+    log:
+        logs("runtime"),
+    benchmark:
+        benchmarks("runtime")
+    conda:
+        "../envs/dapple.yaml"
+    threads: 1
+    resources:
+        mem_mb=500,
+    params:
+        benchmarks=results("benchmarks"),
+    message:
+        "{settings.experiment}: time and memory of every step"
+    script:
+        "../scripts/runtime.py"

@@ -1,0 +1,124 @@
+"""
+Structure: from classified points and shots to geometry that light can meet.
+
+Needs   classes/cloud.laz                 points with `Classification`
+        scan/shots.parquet                every shot with its returns, misses included
+Makes   structure/polygons/*.ply, *.obj   one polygon per 5 cm voxel and class
+        structure/polygons/distance.json  how far cleaned points lie from the polygons
+        structure/voxels_{size}/          plant area density: voxels.nc, voxels.vox
+"""
+
+if settings.source != "wood":
+
+    rule polygons:
+        input:
+            cloud=results("classes/cloud.laz"),
+            truth=(
+                results("structure/truth/summary.json")
+                if settings.source == "virtual"
+                else []
+            ),
+            code=code("polygons"),
+        output:
+            leaves=results("structure/polygons/leaves_0.ply"),
+            wood=results("structure/polygons/wood.ply"),
+            summary=results("structure/polygons/summary.json"),
+        log:
+            logs("polygons"),
+        benchmark:
+            benchmarks("polygons")
+        conda:
+            "../envs/dapple.yaml"
+        threads: 2
+        resources:
+            mem_mb=2000,
+        params:
+            **dict(settings.polygons),
+            seed=stream("polygons"),
+        message:
+            "{settings.experiment}: polygons from {params.voxel_size_m} m voxels"
+        script:
+            "../scripts/polygons.py"
+
+    rule cloud_to_mesh:
+        input:
+            cloud=results("clean/cloud.laz"),
+            leaves=results("structure/polygons/leaves_0.ply"),
+            wood=results("structure/polygons/wood.ply"),
+            code=code("cloud_to_mesh"),
+        output:
+            distance=results("structure/polygons/distance.json"),
+        log:
+            logs("cloud_to_mesh"),
+        benchmark:
+            benchmarks("cloud_to_mesh")
+        conda:
+            "../envs/cloud.yaml"
+        threads: 1
+        resources:
+            mem_mb=4000,
+        params:
+            cloudcompare=settings.tools.cloudcompare,
+            max_points=settings.clean.distance_points,
+            seed=stream("cloud_to_mesh"),
+        message:
+            "{settings.experiment}: distance of the cleaned points from the polygons"
+        script:
+            "../scripts/cloud_to_mesh.py"
+
+
+rule export_obj:
+    input:
+        leaves=results("structure/{meshed}/leaves_0.ply"),
+        wood=results("structure/{meshed}/wood.ply"),
+        code=code("export_obj"),
+    output:
+        leaves=results("structure/{meshed}/leaves.{axes}.obj"),
+        wood=results("structure/{meshed}/wood.{axes}.obj"),
+    log:
+        logs("export_obj_{meshed}_{axes}"),
+    benchmark:
+        benchmarks("export_obj_{meshed}_{axes}")
+    wildcard_constraints:
+        axes="less|dart",
+    conda:
+        "../envs/dapple.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    message:
+        "{settings.experiment}: {wildcards.meshed} in the axes of {wildcards.axes}"
+    script:
+        "../scripts/export_obj.py"
+
+
+rule voxels:
+    input:
+        shots=results("scan/shots.parquet"),
+        classes=results("classes/cloud.laz"),
+        truth=(
+            results("structure/truth/summary.json")
+            if settings.source == "virtual"
+            else []
+        ),
+        code=code("voxels"),
+    output:
+        voxels=results("structure/voxels_{size}/voxels.nc"),
+        amapvox=results("structure/voxels_{size}/voxels.vox"),
+        summary=results("structure/voxels_{size}/summary.json"),
+    log:
+        logs("voxels_{size}"),
+    benchmark:
+        benchmarks("voxels_{size}")
+    conda:
+        "../envs/dapple.yaml"
+    threads: 2
+    resources:
+        mem_mb=2000,
+    params:
+        **settings.voxels.model_dump(exclude={"sizes_m"}),
+        majority_voxel_m=settings.classify.majority_voxel_m,
+    message:
+        "{settings.experiment}: plant area density in {wildcards.size} m voxels"
+    script:
+        "../scripts/voxels.py"

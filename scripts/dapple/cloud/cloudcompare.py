@@ -1,0 +1,286 @@
+"""CloudCompare: statistical outliers and cloud-to-mesh distances.
+
+CloudComPy is used where it can be imported, the command line of CloudCompare otherwise. Both
+exchange binary PLY files around the middle of the cloud, because CloudCompare keeps coordinates in
+single precision.
+"""
+
+import importlib.util
+import re
+import tempfile
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from dapple import programs
+from dapple.errors import EmptyCloudError, InputError
+from dapple.formats.meshes import Mesh
+
+REMEDY = (
+    "Install CloudCompare (Debian: apt-get install --no-install-recommends cloudcompare), "
+    "configure its path, or choose the outlier back end pdal."
+)
+
+INDEX_BASE = 2**20
+"""Row numbers travel as two scalars, row // base and row % base: single precision is exact there,
+while one scalar would be exact only up to 2**24 rows."""
+
+
+class Engine(Protocol):
+    """The two things that dapple asks of CloudCompare."""
+
+    name: str
+    version: str
+
+    def inliers(self, xyz_m: np.ndarray, neighbours: int, multiplier: float) -> np.ndarray:
+        """(k,) ascending indices of the points that are no statistical outliers."""
+
+    def distance_to_mesh(self, xyz_m: np.ndarray, mesh: Mesh) -> np.ndarray:
+        """(n,) float64 distance of each point to the nearest place on the mesh [m]."""
+
+
+def engine(program: str = "CloudCompare") -> Engine:
+    """CloudComPy where `import cloudComPy` works, else CloudCompare's command line."""
+    if importlib.util.find_spec("cloudComPy"):
+        return CloudComPy()
+    return CommandLine(program)
+
+
+class CommandLine:
+    """CloudCompare's command line, without a display.
+
+    Parameters
+    ----------
+    program : str
+        Name or path of the executable.
+    """
+
+    name = "CloudCompare"
+
+    def __init__(self, program: str = "CloudCompare"):
+        self.program = programs.find(program, REMEDY)
+        self.version = "unknown"  # CloudCompare tells it only in the files that it writes
+
+    def inliers(self, xyz_m: np.ndarray, neighbours: int, multiplier: float) -> np.ndarray:
+        """See `statistical_inliers`."""
+        with tempfile.TemporaryDirectory(prefix="cloudcompare-") as folder:
+            given, kept = Path(folder, "given.ply"), Path(folder, "kept.ply")
+            write_points(given, xyz_m - _middle(xyz_m))
+            # CloudCompare counts the point itself among its neighbours, hence the + 1.
+            self._run([given], ["-SOR", str(neighbours + 1), repr(float(multiplier))], kept)
+            return _rows(*_columns(self._read(kept), ("scalar_RowHigh", "scalar_RowLow")))
+
+    def distance_to_mesh(self, xyz_m: np.ndarray, mesh: Mesh) -> np.ndarray:
+        """See `cloud_to_mesh_distance`."""
+        with tempfile.TemporaryDirectory(prefix="cloudcompare-") as folder:
+            given, surface = Path(folder, "given.ply"), Path(folder, "mesh.ply")
+            result = Path(folder, "result.ply")
+            middle = _middle(xyz_m)
+            write_points(given, xyz_m - middle)
+            write_mesh(surface, mesh.vertices_m - middle, mesh.faces)
+            self._run([given, surface], ["-C2M_DIST"], result)
+            points = self._read(result)
+        field = next(name for name in points.dtype.names if name.startswith("scalar_C2M"))
+        distance_m = np.empty(len(xyz_m))
+        rows = _rows(*_columns(points, ("scalar_RowHigh", "scalar_RowLow")))
+        distance_m[rows] = np.abs(points[field])  # signed where triangles have a front side
+        return distance_m
+
+    def _run(self, opened: list[Path], action: list[str], saved: Path) -> None:
+        command = [self.program, "-SILENT", "-AUTO_SAVE", "OFF", "-NO_TIMESTAMP"]
+        command += ["-C_EXPORT_FMT", "PLY", "-PLY_EXPORT_FMT", "BINARY_LE"]
+        for path in opened:
+            command += ["-O", "-GLOBAL_SHIFT", "AUTO", str(path)]
+        command += [*action, "-SAVE_CLOUDS", "FILE", str(saved)]
+        printed = programs.run(command, environment={"QT_QPA_PLATFORM": "offscreen"})
+        if not saved.is_file():
+            raise programs.failure(command, "no output file", printed)
+
+    def _read(self, path: Path) -> np.ndarray:
+        points, comments = read_points(path)
+        if match := re.search(r"CloudCompare v(\S+)", comments):
+            self.version = match.group(1)
+        return points
+
+
+class CloudComPy:
+    """CloudCompare in this process, through its Python module (conda; on no package index).
+
+    Its results are those of the command line: the same library does the work.
+    """
+
+    name = "CloudComPy"
+
+    def __init__(self):
+        import cloudComPy
+
+        self._module = cloudComPy
+        self._module.initCC()
+        self.version = str(getattr(cloudComPy, "__version__", "unknown"))
+
+    def inliers(self, xyz_m: np.ndarray, neighbours: int, multiplier: float) -> np.ndarray:
+        """See `statistical_inliers`."""
+        with tempfile.TemporaryDirectory(prefix="cloudcompy-") as folder:
+            cloud = self._load(Path(folder, "given.ply"), xyz_m - _middle(xyz_m))
+        kept = self._module.CloudSamplingTools.sorFilter(
+            cloud=cloud, knn=neighbours + 1, nSigma=float(multiplier)
+        )
+        clone, _ = cloud.partialClone(kept)
+        fields = clone.getScalarFieldDic()
+        return _rows(
+            *(clone.getScalarField(fields[name]).toNpArrayCopy() for name in ("RowHigh", "RowLow"))
+        )
+
+    def distance_to_mesh(self, xyz_m: np.ndarray, mesh: Mesh) -> np.ndarray:
+        """See `cloud_to_mesh_distance`."""
+        module, middle = self._module, _middle(xyz_m)
+        with tempfile.TemporaryDirectory(prefix="cloudcompy-") as folder:
+            cloud = self._load(Path(folder, "given.ply"), xyz_m - middle)
+            surface = Path(folder, "mesh.ply")
+            write_mesh(surface, mesh.vertices_m - middle, mesh.faces)
+            loaded = module.loadMesh(str(surface))
+        tools = module.DistanceComputationTools
+        parameters = module.Cloud2MeshDistancesComputationParams()
+        parameters.octreeLevel = tools.determineBestOctreeLevel(cloud, loaded)
+        parameters.signedDistances = False
+        tools.computeCloud2MeshDistances(cloud, loaded, parameters)
+        last = cloud.getNumberOfScalarFields() - 1
+        return np.abs(cloud.getScalarField(last).toNpArrayCopy()).astype(np.float64)
+
+    def _load(self, path: Path, xyz_m: np.ndarray):
+        write_points(path, xyz_m)
+        return self._module.loadPointCloud(str(path))
+
+
+def statistical_inliers(
+    xyz_m: np.ndarray,
+    *,
+    neighbours: int = 8,
+    multiplier: float = 3.0,
+    program: str = "CloudCompare",
+) -> np.ndarray:
+    """Find the points that are not statistical outliers.
+
+    Parameters
+    ----------
+    xyz_m : (n, 3) float64
+        Local frame [m].
+    neighbours : int
+        Number of nearest neighbours, the point itself not counted.
+    multiplier : float
+        The limit is mean + multiplier × standard deviation of all mean distances.
+    program : str
+        CloudCompare's name or path.
+
+    Returns
+    -------
+    (k,) int64
+        Ascending indices of the points that stay.
+    """
+    return engine(program).inliers(xyz_m, neighbours, multiplier)
+
+
+def cloud_to_mesh_distance(
+    xyz_m: np.ndarray, mesh: Mesh, *, program: str = "CloudCompare"
+) -> np.ndarray:
+    """Distance of every point to the nearest place on a mesh.
+
+    Parameters
+    ----------
+    xyz_m : (n, 3) float64
+        Local frame [m].
+    mesh : Mesh
+        Triangles in the same frame.
+    program : str
+        CloudCompare's name or path.
+
+    Returns
+    -------
+    (n,) float64
+        Unsigned distances [m].
+
+    Raises
+    ------
+    EmptyCloudError
+        No points or no triangles.
+    ProgramError
+        CloudCompare failed.
+    """
+    for what, n in (("points", len(xyz_m)), ("triangles", len(mesh.faces))):
+        if n == 0:
+            raise EmptyCloudError(
+                "cloud-to-mesh distance", f"no {what}", "some", "Check the step that made them."
+            )
+    return engine(program).distance_to_mesh(xyz_m, mesh)
+
+
+def summary(distance_m: np.ndarray, *, close_m: float = 0.02) -> dict:
+    """Mean, median and 95th percentile of distances [m], and the share within `close_m`."""
+    return {
+        "n": len(distance_m),
+        "mean_m": float(np.mean(distance_m)),
+        "median_m": float(np.median(distance_m)),
+        "p95_m": float(np.percentile(distance_m, 95)),
+        "close_m": close_m,
+        "share_close": float(np.mean(distance_m <= close_m)),
+    }
+
+
+def write_points(path: Path, xyz_m: np.ndarray) -> None:
+    """Write points and their row numbers as binary PLY, single precision."""
+    row = np.arange(len(xyz_m))
+    columns = dict(zip("xyz", np.asarray(xyz_m).T, strict=True))
+    columns |= {"scalar_RowHigh": row // INDEX_BASE, "scalar_RowLow": row % INDEX_BASE}
+    points = np.empty(len(xyz_m), [(name, "<f4") for name in columns])
+    for name, values in columns.items():
+        points[name] = values
+    with path.open("wb") as file:
+        file.write(_header(("vertex", len(points), [f"float {name}" for name in columns])))
+        points.tofile(file)
+
+
+def write_mesh(path: Path, vertices_m: np.ndarray, faces: np.ndarray) -> None:
+    """Write triangles as binary PLY, single precision."""
+    triangles = np.empty(len(faces), [("n", "u1"), ("corner", "<i4", 3)])
+    triangles["n"], triangles["corner"] = 3, faces
+    vertex = ("vertex", len(vertices_m), [f"float {axis}" for axis in "xyz"])
+    face = ("face", len(faces), ["list uchar int vertex_indices"])
+    with path.open("wb") as file:
+        file.write(_header(vertex, face))
+        file.write(np.ascontiguousarray(vertices_m, "<f4").tobytes())
+        triangles.tofile(file)
+
+
+def read_points(path: Path) -> tuple[np.ndarray, str]:
+    """Read the vertices of a binary PLY of floats, as CloudCompare writes it, and its header."""
+    with path.open("rb") as file:
+        lines = []
+        while (line := file.readline().decode("ascii", "replace").strip()) != "end_header":
+            if not file.peek(1):
+                raise InputError(path, "a PLY header without end", "binary PLY", REMEDY)
+            lines.append(line)
+        types = {"float": "<f4", "double": "<f8", "uchar": "u1", "int": "<i4"}
+        n_points = next(int(line.split()[2]) for line in lines if line.startswith("element vertex"))
+        properties = [line.split()[1:] for line in lines if line.startswith("property")]
+        dtype = [(name, types[kind]) for kind, name in properties]
+        return np.fromfile(file, dtype, n_points), "\n".join(lines)
+
+
+def _header(*elements: tuple[str, int, list[str]]) -> bytes:
+    lines = ["ply", "format binary_little_endian 1.0"]
+    for name, n, properties in elements:
+        lines += [f"element {name} {n}", *(f"property {entry}" for entry in properties)]
+    return ("\n".join(lines) + "\nend_header\n").encode("ascii")
+
+
+def _middle(xyz_m: np.ndarray) -> np.ndarray:
+    return 0.5 * (np.min(xyz_m, axis=0) + np.max(xyz_m, axis=0))
+
+
+def _columns(points: np.ndarray, names: tuple[str, ...]) -> list[np.ndarray]:
+    return [points[name] for name in names]
+
+
+def _rows(high: np.ndarray, low: np.ndarray) -> np.ndarray:
+    return np.asarray(high).astype(np.int64) * INDEX_BASE + np.asarray(low).astype(np.int64)

@@ -1,0 +1,395 @@
+"""Typed configuration: every parameter with its unit, default, range and source.
+
+The default configuration, its schema and its documentation are made from these classes:
+`make docs` writes them.
+"""
+
+from __future__ import annotations
+
+import difflib
+from math import sqrt
+from typing import Annotated, Any, Literal
+
+from annotated_types import Ge, Gt, Le
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from dapple.errors import InputError
+
+Positive = Annotated[float, Gt(0)]
+NotNegative = Annotated[float, Ge(0)]
+Share = Annotated[float, Ge(0), Le(1)]
+Count = Annotated[int, Ge(1)]
+LeafAngles = Literal[
+    "spherical", "planophile", "erectophile", "plagiophile", "extremophile", "uniform"
+]
+
+FREY = "Frey et al. 2025"
+
+
+def _(default: Any, text: str, source: str = "") -> Any:
+    """A parameter: default, what it means, and where its value comes from."""
+    return Field(
+        default, description=text, json_schema_extra={"source": source} if source else None
+    )
+
+
+class Section(BaseModel):
+    """A group of parameters; keys that are not parameters are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+
+
+class Plant(Section):
+    """The virtual apple tree (`source: virtual`)."""
+
+    height_m: Positive = _(6.6, "height", FREY)
+    crown_base_m: Positive = _(2.1, "height of the lowest leaves", FREY)
+    crown_radius_m: Positive = _(3.78, "radius of the crown; projection 45 m²", FREY)
+    dbh_m: Positive = _(0.19, "stem diameter at 1.3 m", FREY)
+    leaf_area_m2: Positive = _(90.0, "one-sided leaf area")
+    leaf_length_min_m: Positive = _(0.05, "shortest leaf")
+    leaf_length_max_m: Positive = _(0.08, "longest leaf")
+
+
+class Leaves(Section):
+    """Virtual leaf polygons along real wood (`source: wood`)."""
+
+    placements: Count = _(8, "independent placements; light is their mean")
+    leaf_area_m2: Positive = _(187.0, "area of all leaf polygons", FREY)
+    n_elements: Count = _(147_098, "leaf polygons, one in a 5 cm voxel", FREY)
+    small_share: Share = _(40_190 / 147_098, "share of polygons made of one or two points", FREY)
+
+
+class Scan(Section):
+    """The virtual terrestrial scanner, after the RIEGL VZ-400i."""
+
+    positions: Count = _(8, "scan positions on a circle around the stem", FREY)
+    radius_m: Positive = _(10.0, "distance of the positions from the stem", FREY)
+    height_m: Positive = _(1.6, "height of the scanner above the ground")
+    angular_step_deg: Annotated[float, Ge(0.005), Le(2)] = _(
+        0.12, "angle between neighbouring shots; 0.04 in the field", FREY
+    )
+    beam_divergence_mrad: NotNegative = _(
+        0.35, "full angle of the beam", "RIEGL VZ-400i data sheet"
+    )
+    sub_rays: Count = _(13, "rays that sample one beam")
+    range_noise_m: NotNegative = _(
+        0.005, "standard deviation of a range", "RIEGL VZ-400i data sheet"
+    )
+    noise_points: NotNegative = _(0.002, "isolated noise points per shot")
+    leaf_reflectance_db: float = _(-8.0, "mean reflectance of leaves at the scanner's wavelength")
+    bark_reflectance_db: float = _(-3.5, "mean reflectance of bark at the scanner's wavelength")
+
+
+class CloudInput(Section):
+    """A real point cloud (`source: cloud`)."""
+
+    path: str = _("", "point cloud (las, laz, ply, e57, ptx, txt), relative to data_dir")
+    scan_positions: str = _(
+        "", "CSV of scan positions: position, x, y, z in the cloud's coordinates"
+    )
+    shots: Literal["none", "recorded", "scan_frame"] = _(
+        "none", "misses: not known, recorded in the file (ptx), or rebuilt from scan_frame"
+    )
+    ground_z_m: float | None = _(None, "height of the flat ground; null: the lowest point")
+
+
+class ScanFrame(Section):
+    """The regular angular frame of a single scan, from which its misses are rebuilt."""
+
+    n_zenith: Count = _(2082, "directions from zenith_start_deg to zenith_end_deg")
+    n_azimuth: Count = _(580, "directions from azimuth_start_deg to azimuth_end_deg")
+    zenith_start_deg: float = _(30.0, "first zenith angle")
+    zenith_end_deg: float = _(130.024, "last zenith angle")
+    azimuth_start_deg: float = _(0.0, "first azimuth")
+    azimuth_end_deg: float = _(359.90, "last azimuth")
+    tilt_deg: tuple[float, float, float] = _((1.026, 0.760, -110.019), "roll, pitch, yaw")
+
+
+class Clean(Section):
+    """The noise filter."""
+
+    min_reflectance_db: float = _(-15.0, "points at or below are dropped", FREY)
+    max_deviation: Positive = _(15.0, "points at or above are dropped", FREY)
+    outlier_backend: Literal["cloudcompare", "pdal", "none"] = _(
+        "cloudcompare", "program that finds statistical outliers"
+    )
+    outlier_neighbours: Count = _(8, "neighbours whose mean distance is judged")
+    outlier_multiplier: Positive = _(3.0, "standard deviations beyond which a point is an outlier")
+    thin_voxel_m: Positive = _(0.01, "one point is left in a voxel of this size", FREY)
+    distance_points: Count = _(200_000, "points whose distance from the polygons is measured")
+    min_height_m: NotNegative = _(0.1, "points lower above the ground are dropped")
+
+
+class Classify(Section):
+    """Leaf or wood."""
+
+    method: Literal["reflectance", "mixture", "geometry", "all_leaf"] = _(
+        "reflectance",
+        "fixed threshold, threshold from the data, shape of the neighbourhood, or none",
+    )
+    threshold_db: float = _(-5.4, "reflectance above which a point is wood", FREY)
+    majority_voxel_m: Positive = _(0.05, "voxels in which the majority decides", FREY)
+
+
+class Polygons(Section):
+    """One planar polygon per voxel and class."""
+
+    voxel_size_m: Positive = _(0.05, "edge of the voxels", FREY)
+    buffer_m: NotNegative = _(round(sqrt(2 * 0.01**2) / 2, 6), "outward growth of each hull", FREY)
+
+
+class Voxels(Section):
+    """Plant area density."""
+
+    sizes_m: tuple[Positive, ...] = _((0.2, 1.0), "edges of the voxels", FREY)
+    estimator: Literal["transmittance", "ppl", "fpl", "fpl_biased", "contact_frequency"] = _(
+        "fpl", "bias-corrected free path length", "Pimont et al. 2018"
+    )
+    leaf_angle_distribution: LeafAngles = _("spherical", "of the leaf normals", FREY)
+    single_leaf_area_m2: NotNegative = _(0.0, "finite-element correction; 0: none")
+    max_pad_m2_m3: Positive = _(5.0, "cap of plant area density", "AMAPVox")
+    min_shots: Count = _(5, "fewer shots leave a voxel unknown", "AMAPVox")
+
+
+class Site(Section):
+    """Where the sensors stand."""
+
+    latitude_deg: Annotated[float, Ge(-90), Le(90)] = _(48.0009, "north", FREY)
+    longitude_deg: Annotated[float, Ge(-180), Le(180)] = _(7.8003, "east", FREY)
+    altitude_m: float = _(230.0, "above sea level", FREY)
+
+
+class Time(Section):
+    """The times to be simulated."""
+
+    start: str = _("2023-08-10 10:10", "first time", FREY)
+    end: str = _("2023-08-10 16:50", "last time", FREY)
+    step_min: Positive = _(10.0, "minutes between times")
+    timezone: str = _("UTC", "IANA zone of start and end")
+
+
+class Radiation(Section):
+    """Broadband radiation that reaches the top of the tree."""
+
+    kind: Literal["clear_sky", "table"] = _("clear_sky", "modelled, or read from a file")
+    path: str = _("", "CSV, relative to data_dir")
+    time_column: str = _("time_utc", "column of time stamps")
+    global_column: str = _("global_W_m2", "column of global horizontal irradiance [W m⁻²]")
+    diffuse_column: str = _("diffuse_W_m2", "column of diffuse horizontal irradiance [W m⁻²]")
+    timezone: str = _("UTC", "IANA zone of the time stamps")
+    linke_turbidity: Positive = _(3.0, "haze of the clear-sky model", "Ineichen and Perez 2002")
+    sky: Literal["perez", "isotropic"] = _(
+        "perez", "angular distribution of diffuse light", "Perez et al. 1993"
+    )
+
+
+class LeafOptics(Section):
+    """PROSPECT-D parameters of the leaves."""
+
+    n: Annotated[float, Ge(1), Le(4)] = _(1.5, "leaf structure index N")
+    chlorophyll_ug_cm2: NotNegative = _(45.0, "chlorophyll a + b")
+    carotenoids_ug_cm2: NotNegative = _(9.0, "carotenoids")
+    brown: NotNegative = _(0.0, "brown pigments, arbitrary units")
+    water_cm: NotNegative = _(0.012, "equivalent water thickness")
+    dry_matter_g_cm2: NotNegative = _(0.006, "dry matter")
+
+
+class Spectrum(Section):
+    """A reflectance spectrum, linear between its wavelengths."""
+
+    wavelength_nm: tuple[float, ...] = _((400.0, 700.0), "wavelengths, ascending")
+    reflectance: tuple[Share, ...] = _((0.2, 0.2), "one value for each wavelength")
+    path: str = _("", "instead: a table of wavelength and reflectance, relative to data_dir")
+
+
+class Optics(Section):
+    """Spectra of leaf, bark and meadow."""
+
+    leaf: LeafOptics = LeafOptics()
+    bark: Spectrum = Spectrum(wavelength_nm=(400.0, 550.0, 700.0), reflectance=(0.10, 0.18, 0.26))
+    ground: Spectrum = Spectrum(
+        wavelength_nm=(400.0, 500.0, 550.0, 600.0, 680.0, 700.0),
+        reflectance=(0.03, 0.05, 0.10, 0.07, 0.05, 0.12),
+    )
+
+
+class Sensors(Section):
+    """Horizontal PAR sensors."""
+
+    kind: Literal["grid", "table", "none"] = _("grid", "a grid around the stem, a file, or no light")
+    path: str = _("", "CSV with label, X, Y, Z, relative to data_dir")
+    columns: Count = _(9, "grid: sensors from west to east")
+    rows: Count = _(8, "grid: sensors from south to north")
+    spacing_m: Positive = _(1.0, "grid: distance between neighbours", FREY)
+    height_m: NotNegative = _(0.1, "grid: height above the ground")
+
+
+class Measured(Section):
+    """The measured series."""
+
+    kind: Literal["virtual", "table", "none"] = _(
+        "virtual", "light of the virtual truth through a sensor model, a file, or none"
+    )
+    path: str = _("", "CSV with time_utc, logger, channel, par_umolm2s, relative to data_dir")
+    noise_relative: NotNegative = _(0.02, "sensor model: relative standard deviation")
+    noise_umol_m2_s: NotNegative = _(2.0, "sensor model: absolute standard deviation")
+    clock_offset_s: float = _(0.0, "sensor model: how far the logger's clock is ahead")
+
+
+class Registration(Section):
+    """Origin of the tree's frame and offset of the loggers' clock."""
+
+    fit: bool = _(False, "fit them on a part of the records and report on the rest")
+    origin_m: tuple[float, float, float] = _((0.0, 0.0, 0.0), "origin, or first guess of it")
+    max_shift_m: NotNegative = _(0.4, "largest shift that is tried, east and north")
+    max_clock_offset_s: NotNegative = _(180.0, "largest clock offset that is tried")
+    split: Literal["sensor", "time"] = _(
+        "sensor", "what is divided into fitting and reporting parts"
+    )
+    fit_share: Share = _(0.5, "share of it used for fitting")
+
+
+class Light(Section):
+    """The light at the sensors."""
+
+    variant: str = _("llvm_ad_rgb", "Mitsuba variant: llvm_ad_rgb, cuda_ad_rgb")
+    bands: Literal[1, 3, 61] = _(3, "spectral bands of scattered light")
+    sun_diameter_deg: NotNegative = _(0.533, "angular diameter of the solar disc")
+    sun_samples: Count = _(1024, "paths towards the sun, per sensor and time")
+    sky_samples: Count = _(1024, "paths towards the sky, per sensor and time")
+    max_depth: Annotated[int, Ge(1), Le(100)] = _(12, "longest path")
+
+
+class Statistics(Section):
+    """How simulated and measured light are compared."""
+
+    n_bootstrap: Count = _(1000, "bootstrap replicates, sensors drawn as blocks")
+    confidence: Annotated[float, Gt(0), Le(0.999)] = _(0.95, "level of the intervals")
+
+
+class Figures(Section):
+    """Pictures."""
+
+    sensors: tuple[str, ...] = _((), "sensors of the daily courses; empty: six spread ones")
+    map_times: tuple[str, ...] = _((), "times of the ground maps; empty: four spread ones")
+    map_spacing_m: Positive = _(0.25, "pixel of the ground maps")
+    map_margin_m: NotNegative = _(2.0, "ground shown beyond the crown")
+
+
+class Tools(Section):
+    """External programs; a bare name is looked up on the PATH and in .tools."""
+
+    pdal: str = _("pdal", "PDAL")
+    cloudcompare: str = _("CloudCompare", "CloudCompare")
+
+
+class Settings(Section):
+    """The whole configuration of a run."""
+
+    experiment: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]*$")] = _(
+        "virtual-apple", "name of the run: results go to results/{experiment}"
+    )
+    seed: Annotated[int, Ge(0)] = _(1, "every random number of the run derives from it")
+    data_dir: str = _("../shared/data", "folder of real data; only real experiments read it")
+    source: Literal["virtual", "wood", "cloud"] = _(
+        "virtual", "a virtual tree and scan, real wood with virtual leaves, or a point cloud"
+    )
+    reconstructions: tuple[str, ...] = _(
+        ("polygons", "voxels_0.2", "voxels_1.0", "truth"), "what light is computed for"
+    )
+    wood_path: str = _("", "OBJ of wood polygons in LESS axes (source: wood), relative to data_dir")
+    plant: Plant = Plant()
+    leaves: Leaves = Leaves()
+    scan: Scan = Scan()
+    cloud: CloudInput = CloudInput()
+    scan_frame: ScanFrame = ScanFrame()
+    clean: Clean = Clean()
+    classify: Classify = Classify()
+    polygons: Polygons = Polygons()
+    voxels: Voxels = Voxels()
+    site: Site = Site()
+    time: Time = Time()
+    radiation: Radiation = Radiation()
+    optics: Optics = Optics()
+    sensors: Sensors = Sensors()
+    measured: Measured = Measured()
+    registration: Registration = Registration()
+    light: Light = Light()
+    statistics: Statistics = Statistics()
+    figures: Figures = Figures()
+    tools: Tools = Tools()
+
+
+def validate(config: dict[str, Any], where: str = "configuration") -> Settings:
+    """Turn a merged configuration into typed settings.
+
+    Raises
+    ------
+    InputError
+        A key that does not exist (the nearest valid one is named), a value of the wrong type or out
+        of its range, or values that contradict each other.
+    """
+    try:
+        settings = Settings.model_validate(config)
+    except ValidationError as error:
+        raise _explain(error, where) from None
+    _check_consistency(settings, where)
+    return settings
+
+
+def _explain(error: ValidationError, where: str) -> InputError:
+    """The first complaint of pydantic in our own terms."""
+    first = error.errors()[0]
+    key = ".".join(str(part) for part in first["loc"])
+    if first["type"] == "extra_forbidden":
+        known = _keys_beside(first["loc"])
+        close = difflib.get_close_matches(str(first["loc"][-1]), known, n=1, cutoff=0.4)
+        hint = f"Did you mean `{close[0]}`?" if close else f"Known keys: {', '.join(known)}."
+        return InputError(where, f"unknown key `{key}`", "a key of config/README.md", hint)
+    return InputError(
+        where,
+        f"`{key}: {first['input']!r}`",
+        first["msg"].lower(),
+        "See config/README.md for the meaning and range of every key.",
+    )
+
+
+def _keys_beside(location: tuple[int | str, ...]) -> list[str]:
+    """The valid keys of the section in which the unknown key stands."""
+    section: type[BaseModel] = Settings
+    for part in location[:-1]:
+        section = section.model_fields[str(part)].annotation
+    return list(section.model_fields)
+
+
+def _check_consistency(settings: Settings, where: str) -> None:
+    """Values that are valid alone and wrong together."""
+    known = ["polygons", *(f"voxels_{size}" for size in settings.voxels.sizes_m)]
+    if settings.source == "virtual":
+        known.append("truth")
+    for name in settings.reconstructions:
+        if name not in known:
+            raise InputError(
+                where,
+                f"`reconstructions: {name}`",
+                f"one of {', '.join(known)} (source: {settings.source})",
+                "Voxel reconstructions are named after voxels.sizes_m; truth exists in virtual "
+                "worlds only.",
+            )
+    if settings.measured.kind == "virtual" and settings.source != "virtual":
+        raise InputError(
+            where,
+            "`measured.kind: virtual`",
+            "`table` or `none` where the source is not virtual",
+            "Give the records in measured.path or compute light without comparison.",
+        )
+    for name, spectrum in (("bark", settings.optics.bark), ("ground", settings.optics.ground)):
+        if len(spectrum.wavelength_nm) != len(spectrum.reflectance):
+            raise InputError(
+                where,
+                f"`optics.{name}` with {len(spectrum.wavelength_nm)} wavelengths and "
+                f"{len(spectrum.reflectance)} reflectances",
+                "as many of one as of the other",
+                "Complete the shorter list.",
+            )

@@ -1,0 +1,61 @@
+"""The spectral bands in which dapple computes: 400 to 700 nm, photosynthetically active."""
+
+import numpy as np
+from scipy.constants import Avogadro, Planck, speed_of_light
+from scipy.integrate import cumulative_trapezoid
+
+PAR_RANGE_NM = (400.0, 700.0)
+BAND_STEP_NM = 5.0
+
+
+def par_bands(step_nm: float = BAND_STEP_NM) -> np.ndarray:
+    """Centres of the bands [nm]: 400, 405 … 700; the first and the last are half as wide."""
+    start, stop = PAR_RANGE_NM
+    return np.linspace(start, stop, round((stop - start) / step_nm) + 1)
+
+
+def band_edges(centres_nm: np.ndarray) -> np.ndarray:
+    """Edges (b + 1,) of the bands [nm]: midway between centres, ending at the outer centres."""
+    centres = np.asarray(centres_nm, float)
+    return np.concatenate([centres[:1], 0.5 * (centres[1:] + centres[:-1]), centres[-1:]])
+
+
+def band_width(centres_nm: np.ndarray) -> np.ndarray:
+    """Widths (b,) of the bands [nm]."""
+    return np.diff(band_edges(centres_nm))
+
+
+def band_mean(
+    wavelength_nm: np.ndarray, values: np.ndarray, centres_nm: np.ndarray
+) -> np.ndarray:
+    """Average a tabulated spectrum, linear between its wavelengths, over each band.
+
+    Parameters
+    ----------
+    wavelength_nm : (k,) float
+        Ascending wavelengths of the table [nm]; they must cover the bands.
+    values : (..., k) float
+        The spectrum.
+    centres_nm : (b,) float
+        Band centres [nm].
+
+    Returns
+    -------
+    (..., b) float64
+        Exact means of the piecewise linear spectrum.
+    """
+    wavelength, values = np.asarray(wavelength_nm, float), np.asarray(values, float)
+    edges = band_edges(centres_nm)
+    inside = (wavelength > edges[0]) & (wavelength < edges[-1])
+    nodes = np.union1d(wavelength[inside], edges)
+    right = np.clip(np.searchsorted(wavelength, nodes), 1, len(wavelength) - 1)
+    share = (nodes - wavelength[right - 1]) / (wavelength[right] - wavelength[right - 1])
+    at_nodes = values[..., right - 1] * (1 - share) + values[..., right] * share
+    integral = cumulative_trapezoid(at_nodes, nodes, axis=-1, initial=0.0)
+    return np.diff(integral[..., np.searchsorted(nodes, edges)], axis=-1) / np.diff(edges)
+
+
+def photon_flux(irradiance_w_m2: np.ndarray, wavelength_nm: np.ndarray) -> np.ndarray:
+    """Photon flux [µmol m⁻² s⁻¹] of light of one wavelength: E λ / (h c N_A)."""
+    joule_per_mole = Planck * speed_of_light * Avogadro / (np.asarray(wavelength_nm, float) * 1e-9)
+    return 1e6 * np.asarray(irradiance_w_m2, float) / joule_per_mole

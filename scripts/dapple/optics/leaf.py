@@ -1,0 +1,112 @@
+"""Leaf reflectance and transmittance from biochemistry, with PROSPECT."""
+
+import numpy as np
+
+from dapple.errors import InputError
+from dapple.optics.bands import band_mean
+
+# What PROSPECT was calibrated on, generously: beyond it the model runs, and means nothing.
+LEAF_RANGES = {
+    "n": (1.0, 4.0),
+    "chlorophyll_ug_cm2": (0.0, 150.0),
+    "carotenoids_ug_cm2": (0.0, 50.0),
+    "anthocyanin_ug_cm2": (0.0, 50.0),
+    "brown": (0.0, 5.0),
+    "water_cm": (0.0, 0.1),
+    "dry_matter_g_cm2": (0.0, 0.05),
+}
+
+
+def leaf_spectra(
+    wavelength_nm: np.ndarray,
+    *,
+    n: float = 1.5,
+    chlorophyll_ug_cm2: float = 45.0,
+    carotenoids_ug_cm2: float = 9.0,
+    anthocyanin_ug_cm2: float = 0.0,
+    brown: float = 0.0,
+    water_cm: float = 0.012,
+    dry_matter_g_cm2: float = 0.006,
+    prospect_version: str = "D",
+) -> tuple[np.ndarray, np.ndarray]:
+    """Reflectance and transmittance of a leaf, averaged over each band.
+
+    The defaults stand for a healthy, mature apple leaf. They are assumed, not measured on
+    any tree; in the PAR band only chlorophyll matters much.
+
+    Parameters
+    ----------
+    wavelength_nm : (b,) float
+        Band centres [nm], within 400 to 2500.
+    n : float
+        Leaf structure index N (number of elementary layers), 1 to 4.
+    chlorophyll_ug_cm2, carotenoids_ug_cm2, anthocyanin_ug_cm2 : float
+        Pigments per leaf area [µg cm⁻²]. PROSPECT-5 knows no anthocyanin.
+    brown : float
+        Brown pigments, in arbitrary units.
+    water_cm, dry_matter_g_cm2 : float
+        Equivalent water thickness [cm] and dry matter [g cm⁻²].
+    prospect_version : {"5", "D"}
+        Which calibration of the absorption coefficients.
+
+    Returns
+    -------
+    reflectance, transmittance : (b,) float64
+        Directional-hemispherical, 0 to 1.
+
+    Raises
+    ------
+    InputError
+        A parameter is outside the range in `LEAF_RANGES`.
+
+    Notes
+    -----
+    Jacquemoud and Baret (1990), Féret et al. (2008, PROSPECT-5; 2017, PROSPECT-D), as
+    implemented in the Python package `prosail`.
+    """
+    leaf = {
+        "n": n,
+        "chlorophyll_ug_cm2": chlorophyll_ug_cm2,
+        "carotenoids_ug_cm2": carotenoids_ug_cm2,
+        "anthocyanin_ug_cm2": anthocyanin_ug_cm2,
+        "brown": brown,
+        "water_cm": water_cm,
+        "dry_matter_g_cm2": dry_matter_g_cm2,
+    }
+    _check(leaf, prospect_version)
+    import prosail  # takes seconds to import, and only this function needs it
+
+    table_nm, reflectance, transmittance = prosail.run_prospect(
+        n,
+        chlorophyll_ug_cm2,
+        carotenoids_ug_cm2,
+        brown,
+        water_cm,
+        dry_matter_g_cm2,
+        ant=anthocyanin_ug_cm2,
+        prospect_version=prospect_version,
+    )
+    return (
+        band_mean(table_nm, reflectance, wavelength_nm),
+        band_mean(table_nm, transmittance, wavelength_nm),
+    )
+
+
+def _check(leaf: dict[str, float], prospect_version: str) -> None:
+    for name, value in leaf.items():
+        low, high = LEAF_RANGES[name]
+        if not low <= value <= high:
+            raise InputError(
+                f"leaf {name}", f"{value}", f"{low} to {high}", "Mind the unit in the name."
+            )
+    if prospect_version not in ("5", "D"):
+        raise InputError(
+            "leaf prospect_version", f"{prospect_version!r}", '"5" or "D"', "Choose one of them."
+        )
+    if prospect_version == "5" and leaf["anthocyanin_ug_cm2"] > 0:
+        raise InputError(
+            "leaf anthocyanin_ug_cm2",
+            f"{leaf['anthocyanin_ug_cm2']} with PROSPECT-5",
+            "0",
+            'PROSPECT-5 knows no anthocyanin: set it to 0 or prospect_version to "D".',
+        )

@@ -1,0 +1,81 @@
+"""Find and run external programs; when one fails, say which command, how, and its last words."""
+
+import os
+import shlex
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+from dapple.errors import InputError
+
+PROJECT_ROOT = Path(__file__).parents[2]
+TAIL_CHARACTERS = 2000
+
+
+class ProgramError(InputError):
+    """An external program failed, or reported success without doing what it was asked."""
+
+
+def find(program: str, remedy: str, *, beside: Sequence[Path] = ()) -> str:
+    """Return the path of an executable.
+
+    Parameters
+    ----------
+    program : str
+        A path, or a bare name to be looked for.
+    remedy : str
+        What the user can do when it is absent.
+    beside : sequence of Path
+        Places that go before PATH when `program` is a bare name.
+
+    Raises
+    ------
+    InputError
+        No such executable.
+    """
+    candidates = [program] if os.sep in program else [*map(str, beside), program]
+    for candidate in candidates:
+        if found := shutil.which(candidate):
+            return found
+    raise InputError(program, "no such program", f"one of {', '.join(candidates)}", remedy)
+
+
+def run(command: Sequence[str | Path], *, environment: dict[str, str] | None = None) -> str:
+    """Run a command to its end and return its standard output.
+
+    Parameters
+    ----------
+    command : sequence of str or Path
+        Program and arguments; no shell is involved.
+    environment : dict, optional
+        Variables to set on top of the current environment.
+
+    Raises
+    ------
+    ProgramError
+        The exit code is not zero.
+    """
+    words = [str(word) for word in command]
+    done = subprocess.run(
+        words,
+        env=os.environ | (environment or {}),
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        errors="replace",
+    )
+    if done.returncode:
+        raise failure(words, f"exit code {done.returncode}", done.stderr.strip() or done.stdout)
+    return done.stdout
+
+
+def failure(command: Sequence[str | Path], state: str, output: str) -> ProgramError:
+    """The error of a command that ended in `state` after printing `output`."""
+    tail = output.strip()[-TAIL_CHARACTERS:] or "no output"
+    return ProgramError(
+        shlex.join(str(word) for word in command),
+        f"{state}: {tail}",
+        "exit code 0 and a result",
+        "Run the command by hand to see more; check the input file and the free disk space.",
+    )

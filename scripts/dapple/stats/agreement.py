@@ -1,0 +1,73 @@
+"""The fast engine against the per-timestep reference, on the scale of the open sky."""
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from dapple.errors import InputError
+
+COLUMNS = ["reconstruction", "n", "rmse_rel", "bias_rel", "max_abs_z"]
+PAR, ERROR = "par_umol_m2_s", "standard_error_umol_m2_s"
+
+
+def compare(
+    fast: xr.Dataset,
+    reference: xr.Dataset,
+    open_sky_umol_m2_s: xr.DataArray,
+    *,
+    float_resolution: float = 1e-6,
+) -> dict[str, float]:
+    """Compare two light datasets of one reconstruction where both have a value.
+
+    Parameters
+    ----------
+    fast, reference : Dataset
+        Dims `sensor`, `time`; `par_umol_m2_s` and its `standard_error_umol_m2_s`
+        [µmol m⁻² s⁻¹].
+    open_sky_umol_m2_s : DataArray
+        Horizontal PAR without any obstacle, dim `time` [µmol m⁻² s⁻¹].
+    float_resolution : float
+        Relative rounding error of single precision, as a share of open-sky PAR. It is part of
+        z, so that two engines without Monte Carlo noise may differ in the last digit.
+
+    Returns
+    -------
+    dict
+        `n` pairs; `rmse_rel` and `bias_rel` (fast minus reference) of differences divided by
+        open-sky PAR of their time; `max_abs_z`, the largest difference in units of the joint
+        standard error. Times without light are left out.
+
+    Raises
+    ------
+    InputError
+        The datasets share no sensor and time with light.
+    """
+    fast, reference, open_sky = xr.align(fast, reference, open_sky_umol_m2_s, join="inner")
+    difference = (fast[PAR] - reference[PAR]).transpose("sensor", "time").to_numpy()
+    variance = fast[ERROR] ** 2 + reference[ERROR] ** 2
+    sigma = np.sqrt(variance + (float_resolution * open_sky) ** 2)
+    sigma = sigma.transpose("sensor", "time").to_numpy()
+    scale = np.broadcast_to(open_sky.to_numpy(), difference.shape)
+    usable = np.isfinite(difference) & (scale > 0)
+    if not usable.any():
+        raise InputError(
+            "light datasets",
+            f"no pair of values in {difference.shape[0]} common sensors and "
+            f"{difference.shape[1]} common times with light",
+            "two runs of the same sensors at the same times",
+            "Give the reference timesteps that the fast engine has too, in daylight.",
+        )
+    relative = difference[usable] / scale[usable]
+    return {
+        "n": int(usable.sum()),
+        "rmse_rel": float(np.sqrt(np.mean(relative**2))),
+        "bias_rel": float(relative.mean()),
+        "max_abs_z": float(np.abs(difference[usable] / sigma[usable]).max()),
+    }
+
+
+def table(rows: dict[str, dict[str, float]]) -> pd.DataFrame:
+    """One row per reconstruction, from what `compare` returned for each."""
+    return pd.DataFrame(
+        [{"reconstruction": name, **row} for name, row in rows.items()], columns=COLUMNS
+    )

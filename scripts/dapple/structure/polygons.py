@@ -1,0 +1,121 @@
+"""One planar polygon for the points of every small voxel, after Frey et al. (2025)."""
+
+import math
+
+import numpy as np
+
+from dapple.errors import EmptyCloudError, InputError
+from dapple.formats.meshes import Mesh
+from dapple.structure import hulls
+
+HALF_POINT_SPACING_M = math.sqrt(2 * 0.01**2) / 2
+"""Half the diagonal of the 1 cm grid to which the cloud is thinned (Frey et al. 2025)."""
+
+_MAX_INDEX = 2**20
+
+
+def reconstruct(
+    points_m: np.ndarray,
+    *,
+    voxel_size_m: float = 0.05,
+    buffer_m: float = HALF_POINT_SPACING_M,
+    mitre_limit: float = math.sqrt(2),
+    seed: int,
+    what: str = "cloud",
+    remedy: str = "Check the filters and the class threshold before this step.",
+) -> Mesh:
+    """Fit one convex planar polygon to the points of every voxel.
+
+    The points of a voxel are projected on the plane through their mean that fits them best
+    (the two axes of largest spread); their convex hull grows outwards. Where points say nothing
+    about a plane, chance does:
+
+    - one or two points, or points in one place: a regular hexagon at their mean, a third of the
+      voxel size in diameter, its normal uniform on the sphere, turned uniformly in its plane;
+    - three or more points on one line: a rectangle that reaches `buffer_m` beyond them on every
+      side, turned uniformly about the line (without a buffer: the hexagon).
+
+    Parameters
+    ----------
+    points_m : (n, 3) float64
+        Points of one class in the local frame (east, north, up) [m].
+    voxel_size_m : float
+        Edge of the cubic voxels; their faces lie at multiples of it from the local origin [m].
+    buffer_m : float
+        Distance by which each edge of a hull moves outwards in its plane [m].
+    mitre_limit : float
+        Corners reach at most this multiple of `buffer_m` beyond the hull's corner; sharper ones
+        are cut off there at right angles to their bisector. With √2, right and blunt angles keep
+        their full corner. The polygon stays convex.
+    seed : int
+        Chooses the random turns. They depend on the seed and the voxel's place alone: not on
+        other voxels, not on the number of threads.
+    what, remedy : str
+        What the points are and what to do where there is none, for the error message.
+
+    Returns
+    -------
+    Mesh
+        One element a voxel, in ascending order of the voxels' (x, y, z) index, cut into triangles
+        that share the polygon's first vertex; normals of fitted planes do not point downwards;
+        areas are one-sided.
+
+    Raises
+    ------
+    EmptyCloudError
+        No point at all: there is nothing to reconstruct.
+    InputError
+        A coordinate is not a finite number, or the points spread over too many voxels.
+
+    Notes
+    -----
+    Frey et al. (2025), Silva Fennica 59, 24027, section 2.4. The text is followed where the
+    authors' R code differs from it: the code takes a third of the voxel size as the hexagon's
+    radius, not its diameter (four times the area); it moves each hull vertex away from the
+    centroid by `buffer_m`, so that edges move by less and by different amounts; it turns hexagons
+    by at most 45° about each axis, so that most stay near horizontal.
+    """
+    points_m = np.ascontiguousarray(points_m, np.float64).reshape(-1, 3)
+    if voxel_size_m <= 0 or buffer_m < 0 or mitre_limit < 1:
+        raise ValueError("voxel_size_m must be positive, buffer_m not negative, mitre_limit ≥ 1")
+    if not len(points_m):
+        raise EmptyCloudError(what, "no point", "at least one", remedy)
+    index = _voxel_index(points_m, voxel_size_m, what)
+    low = index.min(axis=0)
+    n_y, n_z = (index.max(axis=0) - low + 1)[1:]
+    key = ((index[:, 0] - low[0]) * n_y + (index[:, 1] - low[1])) * n_z + (index[:, 2] - low[2])
+    order = np.argsort(key, kind="stable")
+    key = key[order]
+    first = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]]))
+    start = np.concatenate([first, [len(key)]])
+    vertices, place, count = hulls.outlines(
+        points_m[order],
+        start,
+        index[order[first]],
+        float(voxel_size_m),
+        float(buffer_m),
+        float(mitre_limit),
+        int(seed),
+    )
+    return Mesh(*hulls.fans(vertices, place, count))
+
+
+def _voxel_index(points_m: np.ndarray, voxel_size_m: float, what: str) -> np.ndarray:
+    """(n, 3) int64 index of the voxel that each point lies in."""
+    index = np.floor(points_m / voxel_size_m)
+    if not np.isfinite(index).all():
+        raise InputError(
+            what,
+            f"{np.count_nonzero(~np.isfinite(index).all(axis=1))} points that are not finite",
+            "finite coordinates",
+            "Filter the cloud or read the file again.",
+        )
+    span = index.max(axis=0) - index.min(axis=0)
+    if span.max() >= _MAX_INDEX:
+        raise InputError(
+            what,
+            f"points {span.max() * voxel_size_m:.0f} m apart with voxels of {voxel_size_m} m",
+            f"at most {_MAX_INDEX} voxels on a side",
+            "Remove far outliers, or cut the cloud into plots.",
+        )
+    return index.astype(np.int64)
