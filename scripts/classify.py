@@ -1,7 +1,8 @@
 """Tell leaf from wood; score against the truth where it is known."""
 
-from dapple.cloud import classify
 from dapple.cloud.scores import scores
+
+from dapple.cloud import classify
 from dapple.formats import clouds, json
 from dapple.workflow import run
 

@@ -17,9 +17,7 @@ def main(snakemake):
         radius_m=settings.pop("radius_m"),
         height_m=settings.pop("height_m"),
     )
-    shots.write_chunks(
-        snakemake.output.shots, scanner.scan_chunks(plant, positions_m, **settings)
-    )
+    shots.write_chunks(snakemake.output.shots, scanner.scan_chunks(plant, positions_m, **settings))
     fired = shots.read(snakemake.output.shots)
     print(f"{len(fired)} shots, {(fired.n_returns == 0).mean():.1%} of them misses")
     clouds.write(snakemake.output.points, scanner.to_cloud(fired))

@@ -1,7 +1,8 @@
 """Place virtual leaf polygons along real wood."""
 
-from dapple.formats import meshes
 from dapple.virtual.leaves import along_wood
+
+from dapple.formats import meshes
 from dapple.workflow import options, run
 
 

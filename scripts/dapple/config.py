@@ -217,7 +217,9 @@ class Optics(Section):
 class Sensors(Section):
     """Horizontal PAR sensors."""
 
-    kind: Literal["grid", "table", "none"] = _("grid", "a grid around the stem, a file, or no light")
+    kind: Literal["grid", "table", "none"] = _(
+        "grid", "a grid around the stem, a file, or no light"
+    )
     path: str = _("", "CSV with label, X, Y, Z, relative to data_dir")
     columns: Count = _(9, "grid: sensors from west to east")
     rows: Count = _(8, "grid: sensors from south to north")

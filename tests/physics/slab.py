@@ -39,12 +39,12 @@ def transmitted_irradiance(
     for _ in range(400):
         radiance[0, down], radiance[-1, up] = 1.0, 0.0
         for layer in range(N_LAYERS):
-            radiance[layer + 1, down] = (
-                radiance[layer, down] * decay[down] + source[layer, down] * (1 - decay[down])
-            )
+            radiance[layer + 1, down] = radiance[layer, down] * decay[down] + source[
+                layer, down
+            ] * (1 - decay[down])
         for layer in range(N_LAYERS - 1, -1, -1):
-            radiance[layer, up] = (
-                radiance[layer + 1, up] * decay[up] + source[layer, up] * (1 - decay[up])
+            radiance[layer, up] = radiance[layer + 1, up] * decay[up] + source[layer, up] * (
+                1 - decay[up]
             )
         middle = 0.5 * (radiance[1:] + radiance[:-1])
         updated = (middle * weight) @ kernel

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from scipy.special import expn
+from tests.physics.slab import transmitted_irradiance, turbid_slab
 
 from dapple.formats.meshes import Mesh
 from dapple.light import traced, transport
 from dapple.light.patches import patches
 from dapple.light.scene import Optics, Scene
-from tests.physics.slab import transmitted_irradiance, turbid_slab
 
 SENSOR = np.array([[0.0, 0.0, 0.5]])
 
@@ -77,9 +77,7 @@ def test_a_black_layer_lets_twice_the_third_exponential_integral_through(leaf_ar
 @pytest.mark.parametrize("leaf_area_index", [0.5, 1.0, 3.0, 6.0])
 @pytest.mark.parametrize("half_albedo", [0.05, 0.45])
 def test_a_scattering_layer_agrees_with_discrete_ordinates(leaf_area_index, half_albedo):
-    counted = collect(
-        Scene(voxels=turbid_slab(leaf_area_index)), n_paths=200_000, max_orders=60
-    )
+    counted = collect(Scene(voxels=turbid_slab(leaf_area_index)), n_paths=200_000, max_orders=60)
     mean, error = total(counted, optics(half_albedo, half_albedo))
     expected = transmitted_irradiance(leaf_area_index, half_albedo, half_albedo)
     assert mean == pytest.approx(expected, abs=max(0.02 * expected, 4 * error))

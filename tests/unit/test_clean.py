@@ -5,12 +5,13 @@ import json
 import laspy
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
+
 from dapple import programs
 from dapple.cloud import cloudcompare, pdal, voxels
 from dapple.cloud.clean import clean, thin
 from dapple.errors import EmptyCloudError, InputError
 from dapple.formats.clouds import Cloud
-from scipy.spatial import cKDTree
 
 ORIGIN_M = np.array([410500.0, 5317080.0, 280.0])
 
@@ -257,4 +258,6 @@ def test_a_failing_program_shows_its_command_its_exit_code_and_its_last_words():
 
 def test_a_failing_pipeline_shows_what_pdal_said(tmp_path):
     with pytest.raises(programs.ProgramError, match=r"exit code 1.*filters\.nonsense"):
-        pdal.run([str(write_laz(tmp_path / "a.laz", np.ones((3, 3)))), {"type": "filters.nonsense"}])
+        pdal.run(
+            [str(write_laz(tmp_path / "a.laz", np.ones((3, 3)))), {"type": "filters.nonsense"}]
+        )

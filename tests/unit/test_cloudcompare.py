@@ -4,6 +4,7 @@ import importlib.util
 
 import numpy as np
 import pytest
+
 from dapple import programs
 from dapple.cloud import cloudcompare
 from dapple.errors import EmptyCloudError, InputError
@@ -32,7 +33,7 @@ def distance_to_unit_square(xyz_m):
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_distance_to_a_square_is_pythagoras(engine):
-    points = np.random.default_rng(1).uniform(-1, 2, (3000, 3))
+    points = np.random.default_rng(1).uniform(-1, 2, (500, 3))
     distance_m = engine().distance_to_mesh(points, unit_square())
     np.testing.assert_allclose(distance_m, distance_to_unit_square(points), atol=1e-6)
 
@@ -56,6 +57,20 @@ def test_the_side_of_the_surface_does_not_matter(engine):
         np.testing.assert_allclose(
             engine().distance_to_mesh(points, mesh), [0.25, 0.25, 0], atol=1e-6
         )
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_flat_surface_through_the_middle_of_the_cloud_is_seen(engine):
+    points = np.array([[0.5, 0.5, 0.0], [0.2, 0.7, 0.0], [0.5, 0.5, 0.3], [0.5, 0.5, -0.3]])
+    distance_m = engine().distance_to_mesh(points, unit_square())
+    np.testing.assert_allclose(distance_m, [0, 0, 0.3, 0.3], atol=1e-6)
+
+
+def test_a_distance_that_is_not_a_number_is_an_error():
+    broken = unit_square()
+    broken.vertices_m[:] = np.nan
+    with pytest.raises(programs.ProgramError):
+        cloudcompare.cloud_to_mesh_distance(np.ones((3, 3)), broken)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

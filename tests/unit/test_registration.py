@@ -3,13 +3,14 @@
 import numpy as np
 import pandas as pd
 import pytest
+
 from dapple.errors import InputError
 from dapple.stats.registration import register, split
 
-SENSORS_M = np.random.default_rng(7).uniform(-3, 3, (30, 2))
+SENSORS_M = np.random.default_rng(7).uniform(-3, 3, (20, 2))
 BRANCHES = np.random.default_rng(8).uniform(-5, 5, (40, 3)) * [1, 1, 0.25] + [0, 0, 3.5]
-RECORD_S = np.arange(0.0, 4 * 3600, 60)
-FINE_S = np.arange(-600.0, 4 * 3600 + 601, 60)
+RECORD_S = np.arange(0.0, 4 * 3600, 150)
+FINE_S = np.arange(-600.0, 4 * 3600 + 601, 100)
 
 
 def shadows(shifts_m, time_s):
@@ -44,7 +45,9 @@ def test_a_known_shift_and_clock_offset_are_recovered():
 
 
 def test_records_outside_the_fitting_part_have_no_say():
-    parts = split([str(k) for k in range(30)], pd.date_range("2023-08-10", periods=240, tz="UTC"))
+    parts = split(
+        [str(k) for k in range(20)], pd.date_range("2023-08-10", periods=len(RECORD_S), tz="UTC")
+    )
     measured = records(0.25, 0.0, 0.0)
     measured[parts.reporting] = np.random.default_rng(1).uniform(0, 1600, parts.reporting.sum())
     options = {"clock_range_s": 0.0, "shift_range_m": 0.5}
@@ -96,7 +99,12 @@ def test_a_simulation_that_is_too_short_for_the_clock_range_is_an_error():
 
 def test_constant_light_cannot_be_registered():
     with pytest.raises(InputError, match="no candidate with a defined r"):
-        register(np.full((30, 240), 100.0), RECORD_S, lambda s: np.ones((len(s), 30, 261)), FINE_S)
+        register(
+            np.full((20, len(RECORD_S)), 100.0),
+            RECORD_S,
+            lambda s: np.ones((len(s), 20, len(FINE_S))),
+            FINE_S,
+        )
 
 
 def test_sensors_are_split_into_two_named_parts():

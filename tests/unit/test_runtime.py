@@ -2,6 +2,7 @@
 
 import pandas as pd
 import pytest
+
 from dapple.errors import InputError
 from dapple.stats import runtime
 

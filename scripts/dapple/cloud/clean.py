@@ -20,9 +20,26 @@ from dapple.formats.clouds import Cloud
 OUTLIER_BACKENDS = ("cloudcompare", "pdal", "none")
 
 CATEGORIES = frozenset(
-    """Classification TrueClass PointSourceId ReturnNumber NumberOfReturns ScanChannel
-    ScannerChannel ScanDirectionFlag EdgeOfFlightLine UserData Synthetic KeyPoint Withheld Overlap
-    ClassFlags Red Green Blue""".split()
+    [
+        "Classification",
+        "TrueClass",
+        "PointSourceId",
+        "ReturnNumber",
+        "NumberOfReturns",
+        "ScanChannel",
+        "ScannerChannel",
+        "ScanDirectionFlag",
+        "EdgeOfFlightLine",
+        "UserData",
+        "Synthetic",
+        "KeyPoint",
+        "Withheld",
+        "Overlap",
+        "ClassFlags",
+        "Red",
+        "Green",
+        "Blue",
+    ]
 )
 """Attributes whose mean means nothing: a thinned point takes the most frequent value."""
 

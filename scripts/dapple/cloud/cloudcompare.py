@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from dapple import programs
 from dapple.errors import EmptyCloudError, InputError
@@ -76,9 +77,9 @@ class CommandLine:
         with tempfile.TemporaryDirectory(prefix="cloudcompare-") as folder:
             given, surface = Path(folder, "given.ply"), Path(folder, "mesh.ply")
             result = Path(folder, "result.ply")
-            middle = _middle(xyz_m)
-            write_points(given, xyz_m - middle)
-            write_mesh(surface, mesh.vertices_m - middle, mesh.faces)
+            points_m, vertices_m = _tilted(xyz_m, mesh.vertices_m)
+            write_points(given, points_m)
+            write_mesh(surface, vertices_m, mesh.faces)
             self._run([given, surface], ["-C2M_DIST"], result)
             points = self._read(result)
         field = next(name for name in points.dtype.names if name.startswith("scalar_C2M"))
@@ -134,11 +135,12 @@ class CloudComPy:
 
     def distance_to_mesh(self, xyz_m: np.ndarray, mesh: Mesh) -> np.ndarray:
         """See `cloud_to_mesh_distance`."""
-        module, middle = self._module, _middle(xyz_m)
+        module = self._module
+        points_m, vertices_m = _tilted(xyz_m, mesh.vertices_m)
         with tempfile.TemporaryDirectory(prefix="cloudcompy-") as folder:
-            cloud = self._load(Path(folder, "given.ply"), xyz_m - middle)
+            cloud = self._load(Path(folder, "given.ply"), points_m)
             surface = Path(folder, "mesh.ply")
-            write_mesh(surface, mesh.vertices_m - middle, mesh.faces)
+            write_mesh(surface, vertices_m, mesh.faces)
             loaded = module.loadMesh(str(surface))
         tools = module.DistanceComputationTools
         parameters = module.Cloud2MeshDistancesComputationParams()
@@ -212,7 +214,15 @@ def cloud_to_mesh_distance(
             raise EmptyCloudError(
                 "cloud-to-mesh distance", f"no {what}", "some", "Check the step that made them."
             )
-    return engine(program).distance_to_mesh(xyz_m, mesh)
+    distance_m = engine(program).distance_to_mesh(xyz_m, mesh)
+    if unknown := np.count_nonzero(~np.isfinite(distance_m)):
+        raise programs.ProgramError(
+            "CloudCompare -C2M_DIST",
+            f"{unknown} of {len(distance_m)} distances that are not numbers",
+            "a distance for every point",
+            "Look for NaN coordinates in the cloud and the mesh.",
+        )
+    return distance_m
 
 
 def summary(distance_m: np.ndarray, *, close_m: float = 0.02) -> dict:
@@ -276,6 +286,17 @@ def _header(*elements: tuple[str, int, list[str]]) -> bytes:
 
 def _middle(xyz_m: np.ndarray) -> np.ndarray:
     return 0.5 * (np.min(xyz_m, axis=0) + np.max(xyz_m, axis=0))
+
+
+def _tilted(xyz_m: np.ndarray, vertices_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points and vertices about the middle of the cloud, turned together.
+
+    CloudCompare misses triangles that lie exactly on a face of its axis-aligned search cells; the
+    turn keeps horizontal and vertical surfaces off them, and distances do not feel it.
+    """
+    turn = Rotation.from_euler("xyz", [0.61, 0.37, 0.83])
+    middle = _middle(xyz_m)
+    return turn.apply(xyz_m - middle), turn.apply(vertices_m - middle)
 
 
 def _columns(points: np.ndarray, names: tuple[str, ...]) -> list[np.ndarray]:

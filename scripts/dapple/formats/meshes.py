@@ -2,8 +2,11 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
+
+from dapple.formats import obj, ply
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,20 @@ class Mesh:
         return np.bincount(self.element, self.triangle_area_m2, self.n_elements)
 
     @property
+    def element_normal(self) -> np.ndarray:
+        """(n_elements, 3) unit normals, the mean of the triangles' weighted by area."""
+        axes = [
+            np.bincount(self.element, self.triangle_normal[:, k], self.n_elements) for k in range(3)
+        ]
+        normal = np.stack(axes, axis=1)
+        return normal / np.linalg.norm(normal, axis=1, keepdims=True)
+
+    @property
+    def tilt_deg(self) -> np.ndarray:
+        """(n_elements,) angle between each element and the horizontal, 0 to 90 [°]."""
+        return np.degrees(np.arccos(np.clip(np.abs(self.element_normal[:, 2]), 0, 1)))
+
+    @property
     def area_m2(self) -> float:
         """Total one-sided area [m²]."""
         return float(self.triangle_area_m2.sum())
@@ -63,3 +80,91 @@ def concatenate(meshes: list[Mesh]) -> Mesh:
             [m.element + s for m, s in zip(meshes, element_shift[:-1], strict=True)]
         ).astype(np.int32),
     )
+
+
+def write_ply(
+    path: str | Path, mesh: Mesh, origin_m: tuple[float, ...] | np.ndarray = (0.0, 0.0, 0.0)
+) -> None:
+    """Write binary little-endian PLY; nothing is lost.
+
+    Vertices are float64 in the local frame, faces are triangles with an int32 property `element`,
+    a comment names `origin_m`, the world coordinates of the local origin [m].
+    """
+    ply.write(path, mesh.vertices_m, mesh.faces, mesh.element, np.asarray(origin_m, np.float64))
+
+
+def read_ply(path: str | Path) -> Mesh:
+    """Read binary little-endian PLY of triangles.
+
+    Files without the face property `element` are read with one element a triangle.
+
+    Raises
+    ------
+    InputError
+        The file is missing, truncated, of another kind, or its faces name vertices that are not
+        there.
+    """
+    return Mesh(*ply.read(path)[:3])
+
+
+def read_ply_origin(path: str | Path) -> np.ndarray:
+    """(3,) world coordinates of the local origin that the file names, else zeros [m]."""
+    return ply.read(path)[3]
+
+
+def write_obj(path: str | Path, mesh: Mesh, axes: str) -> None:
+    """Write Wavefront OBJ for other programs, one face an element where it is one flat polygon.
+
+    Parameters
+    ----------
+    path : Path
+    mesh : Mesh
+        Elements that are not a flat fan of triangles are written triangle by triangle.
+    axes : str
+        `less`, `dart` (as these programs expect them, see `dapple.frames`) or `local`.
+    """
+    vertices = obj.to_axes(mesh.vertices_m, axes)
+    obj.write(path, vertices, polygons_of(mesh), axes)
+
+
+def read_obj(path: str | Path, axes: str) -> Mesh:
+    """Read Wavefront OBJ; each face becomes an element, cut into triangles from its first vertex.
+
+    Faces may repeat their first vertex at the end (the same index or the same place). Texture and
+    normal indices, groups and materials are ignored.
+
+    Parameters
+    ----------
+    path : Path
+    axes : str
+        The axes of the file: `less`, `dart` or `local`.
+
+    Raises
+    ------
+    InputError
+        The file is missing, holds no face, a line cannot be read, a face names a vertex that is
+        not there, or has fewer than three corners.
+    """
+    vertices, corners, count = obj.read(path)
+    first = np.repeat(np.cumsum(count) - count, count - 2)
+    element = np.repeat(np.arange(len(count)), count - 2)
+    step = np.arange(len(element)) - np.repeat(np.cumsum(count - 2) - (count - 2), count - 2)
+    faces = np.stack([corners[first], corners[first + step + 1], corners[first + step + 2]], axis=1)
+    return Mesh(obj.from_axes(vertices, axes), faces.astype(np.int32), element.astype(np.int32))
+
+
+def polygons_of(mesh: Mesh) -> list[np.ndarray]:
+    """Vertex indices of each element's outline, or of its triangles where it is no flat fan."""
+    faces, element = mesh.faces, mesh.element
+    if not len(faces):
+        return []
+    same = element[1:] == element[:-1]
+    normal = mesh.triangle_normal
+    length = np.linalg.norm(normal, axis=1)
+    flat = (normal[1:] * normal[:-1]).sum(axis=1) >= (1 - 1e-9) * length[1:] * length[:-1]
+    fan = (faces[1:, 0] == faces[:-1, 0]) & (faces[1:, 1] == faces[:-1, 2]) & flat
+    broken = np.zeros(mesh.n_elements, bool)
+    broken[element[1:][same & ~fan]] = True
+    begin = np.flatnonzero(np.concatenate([[True], ~same | broken[element[1:]]]))
+    ends = np.concatenate([begin[1:], [len(faces)]])
+    return [np.concatenate([faces[a, :2], faces[a:b, 2]]) for a, b in zip(begin, ends, strict=True)]

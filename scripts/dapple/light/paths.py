@@ -145,9 +145,7 @@ def _follow(mi, scene, origin, direction, rng, active, max_orders):
         transmitted = leaf & (choice < 0.5)
         reflected = leaf & ~transmitted
         side = dr.select(transmitted, -normal, normal)
-        scattered = mi.Frame3f(side).to_world(
-            mi.warp.square_to_cosine_hemisphere(mi.Point2f(u, v))
-        )
+        scattered = mi.Frame3f(side).to_world(mi.warp.square_to_cosine_hemisphere(mi.Point2f(u, v)))
         # Surfaces push the next ray off themselves; a point in a turbid voxel has no surface.
         push = dr.select(in_voxel, 0.0, scene.ray_offset_m)
         origin[active] = origin + direction * distance + side * push

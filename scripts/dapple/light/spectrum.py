@@ -26,8 +26,10 @@ def par_spectrum(
     """Photon flux per band of the beam and of the sky.
 
     The shapes are those of SPECTRL2, scaled so that the integrals over 300 to 4000 nm are the
-    given broadband irradiances. Diffuse light beyond what SPECTRL2 finds under a cloudless sky
-    is sunlight that clouds or haze have scattered: it gets the shape of global radiation.
+    given broadband irradiances. Blue sky is seen to the degree to which the beam comes through;
+    what is left of the diffuse light, or exceeds a cloudless sky's, is light that clouds or haze
+    have scattered, with the shape of global radiation. Under an overcast sky that is all of it
+    (a blue sky has 2.7 µmol of PAR per joule, global radiation 2.0).
 
     Parameters
     ----------
@@ -72,7 +74,7 @@ def par_spectrum(
     nm, beam, sky = model["wavelength"], model["dni"].T, model["dhi"].T
     total = beam * np.cos(np.radians(zenith))[:, np.newaxis] + sky
     beam_w, sky_w, total_w = (np.trapezoid(part, nm, axis=-1) for part in (beam, sky, total))
-    cloudless = np.minimum(diffuse_w_m2, sky_w)
+    cloudless = np.minimum(diffuse_w_m2, sky_w * np.minimum(direct_normal_w_m2 / beam_w, 1.0))
 
     def photons(shape: np.ndarray, scale: np.ndarray) -> np.ndarray:
         flux = band_mean(nm, photon_flux(shape, nm), wavelength_nm) * band_width(wavelength_nm)

@@ -78,7 +78,7 @@ def extraterrestrial(times: pd.DatetimeIndex) -> np.ndarray:
 
 
 def day_of_year(times: pd.DatetimeIndex) -> np.ndarray:
-    """Day of the year (t,) in UTC, as an array: pvlib's own look-up uses a name that pandas drops."""
+    """Day of the year (t,) in UTC; pvlib would look it up by a name that pandas gives up."""
     return utc(times).day_of_year.to_numpy()
 
 

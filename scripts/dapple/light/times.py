@@ -53,9 +53,7 @@ def utc(times: object, where: str | Path = "times") -> pd.DatetimeIndex:
     return index.tz_convert("UTC").as_unit("ns")
 
 
-def parse(
-    column: pd.Series, where: str | Path, time_zone: str | None = None
-) -> pd.DatetimeIndex:
+def parse(column: pd.Series, where: str | Path, time_zone: str | None = None) -> pd.DatetimeIndex:
     """Parse a text column of times.
 
     Parameters

@@ -25,9 +25,7 @@ def band_width(centres_nm: np.ndarray) -> np.ndarray:
     return np.diff(band_edges(centres_nm))
 
 
-def band_mean(
-    wavelength_nm: np.ndarray, values: np.ndarray, centres_nm: np.ndarray
-) -> np.ndarray:
+def band_mean(wavelength_nm: np.ndarray, values: np.ndarray, centres_nm: np.ndarray) -> np.ndarray:
     """Average a tabulated spectrum, linear between its wavelengths, over each band.
 
     Parameters

@@ -14,6 +14,8 @@ import pandas as pd
 from dapple.errors import InputError
 from dapple.stats.correlation import pearson
 
+CANDIDATES = ["level", "east_m", "north_m", "clock_offset_s", "r"]
+
 Simulate = Callable[[np.ndarray], np.ndarray]
 """Shifts (k, 2) east and north [m] to PAR (k, sensor, fine time)."""
 
@@ -26,6 +28,8 @@ class Split:
     ----------
     fitting, reporting : (sensor, time) bool
         Disjoint, together everything.
+    sensors, times : sequence of str, DatetimeIndex
+        The axes of the masks.
     fitting_part, reporting_part : str
         The two parts in words, with the sensors or the times in them.
     """
@@ -34,6 +38,18 @@ class Split:
     reporting: np.ndarray
     fitting_part: str
     reporting_part: str
+    sensors: Sequence[str]
+    times: pd.DatetimeIndex
+
+    def reports(self, sensor: pd.Series, time: pd.Series) -> np.ndarray:
+        """Which rows of a table of records belong to the reporting part.
+
+        Sensors that the split does not know report; a time between two known ones belongs to the
+        earlier.
+        """
+        row = pd.Index(self.sensors).get_indexer(sensor)
+        column = np.clip(self.times.searchsorted(time, side="right") - 1, 0, None)
+        return np.where(row < 0, True, self.reporting[row, column])
 
 
 @dataclass(frozen=True)
@@ -54,7 +70,8 @@ class Registration:
         Which of `east_m`, `north_m`, `clock_offset_s` ended at the limit of its range: the truth
         may lie beyond it.
     candidates : DataFrame
-        `level, east_m, north_m, clock_offset_s, r`: all that was tried.
+        `level, east_m, north_m, clock_offset_s, r`: every shift that was tried, at its best
+        clock offset.
     """
 
     east_m: float
@@ -121,7 +138,7 @@ def split(
             for mask in (chosen, ~chosen)
         )
         fitting = np.broadcast_to(chosen[:, None], (n, len(times))).copy()
-    return Split(fitting, ~fitting, *words)
+    return Split(fitting, ~fitting, *words, sensors, times)
 
 
 def register(
@@ -134,14 +151,17 @@ def register(
     centre_m: tuple[float, float] = (0.0, 0.0),
     shift_range_m: float = 1.0,
     shift_step_m: float = 0.25,
-    shift_resolution_m: float = 0.03,
+    shift_resolution_m: float = 0.01,
     clock_range_s: float = 300.0,
-    clock_step_s: float = 60.0,
-    clock_resolution_s: float = 10.0,
+    clock_step_s: float = 10.0,
     n_starts: int = 3,
     max_shifts_per_call: int = 32,
 ) -> Registration:
-    """Search shift and clock offset, coarse to fine, for the highest r on the fitting records.
+    """Search shift and clock offset for the highest r on the fitting records.
+
+    The clock offset needs no new simulation, so every shift is scored at its best offset: that
+    leaves a search in the plane. It begins with a grid, climbs from the best grid points to their
+    peaks, and repeats the climb with half the step until the resolution is reached.
 
     Parameters
     ----------
@@ -161,13 +181,15 @@ def register(
         Centre of the search, east and north [m].
     shift_range_m, clock_range_s : float
         Half width of the search [m], [s]; 0 keeps that quantity at its centre.
-    shift_step_m, clock_step_s : float
-        First spacing of the grid [m], [s]; halved from level to level. The first spacing has to
-        resolve the shadows (a branch or a gap), or their peak falls between two candidates.
-    shift_resolution_m, clock_resolution_s : float
-        Spacing at which the search stops [m], [s].
+    shift_step_m : float
+        Spacing of the first grid [m]. It has to resolve the shadows (a branch, a gap), or a peak
+        falls between two grid points.
+    shift_resolution_m : float
+        The climb ends when its step is no longer than this [m].
+    clock_step_s : float
+        Spacing of the clock offsets [s].
     n_starts : int
-        Number of best, mutually distant candidates that are refined from level to level.
+        Number of best, mutually distant grid points from which to climb.
     max_shifts_per_call : int
         Largest k, which bounds the memory of `simulate`.
 
@@ -183,23 +205,37 @@ def register(
     """
     usable = np.isfinite(measured) & (True if fitting is None else fitting)
     _check(usable, time_s, fine_time_s, clock_range_s)
-    grid = np.array([shift_step_m, shift_step_m, clock_step_s])
-    finest = np.array([shift_resolution_m, shift_resolution_m, clock_resolution_s])
-    centre = np.array([*centre_m, 0.0])
-    half = np.array([shift_range_m, shift_range_m, clock_range_s])
-    scores: dict[tuple[float, ...], tuple[int, float]] = {}
-    candidates = _grid(centre, half, grid)
-    for level in range(32):
-        new = [c for c in candidates if c not in scores]
-        r = _scores(new, measured, usable, time_s, simulate, fine_time_s, max_shifts_per_call)
-        scores |= {candidate: (level, value) for candidate, value in zip(new, r, strict=True)}
-        best = _best(scores, n_starts, grid)
-        if np.all((grid <= finest) | (half == 0)):
-            break
-        # The finer grid reaches one coarse step around every start, within the range.
-        reach, grid = grid, np.where(grid > finest, grid / 2, grid)
-        candidates = _around(best, reach, grid, centre, half)
-    return _registration(scores, best[0], centre, half, int(usable.sum()))
+    offsets_s = _axis(0.0, clock_range_s, clock_step_s)
+    scores = pd.DataFrame(columns=CANDIDATES, dtype=float)
+
+    def score(shifts: np.ndarray, level: int) -> None:
+        """Add the shifts that are new to the table, a bounded number at a time."""
+        nonlocal scores
+        known = set(map(tuple, scores[["east_m", "north_m"]].to_numpy()))
+        new = np.array([shift for shift in shifts.tolist() if tuple(shift) not in known])
+        for start in range(0, len(new), max_shifts_per_call):
+            some = new[start : start + max_shifts_per_call]
+            light = np.asarray(simulate(some), float)
+            _check_shape(light, (len(some), len(measured), len(fine_time_s)))
+            found = [
+                _best_clock(one, measured, usable, time_s, fine_time_s, offsets_s) for one in light
+            ]
+            rows = np.column_stack([np.full(len(some), level), some, found])
+            scores = pd.DataFrame(np.vstack([scores, rows]), columns=CANDIDATES)
+
+    centre = np.array(centre_m)
+    score(_square(centre, shift_range_m, shift_step_m), 0)
+    step, level = shift_step_m, 0
+    while shift_range_m > 0 and step > shift_resolution_m:
+        step, level = step / 2, level + 1
+        for _ in range(100):
+            starts = _peaks(scores, n_starts, shift_step_m)
+            around = np.concatenate([_square(start, step, step) for start in starts])
+            inside = np.abs(around - centre).max(axis=1) <= shift_range_m + 1e-9
+            score(np.unique(around[inside], axis=0), level)
+            if np.array_equal(starts, _peaks(scores, n_starts, shift_step_m)):
+                break
+    return _registration(scores, centre, shift_range_m, clock_range_s, int(usable.sum()))
 
 
 def _check(usable, time_s, fine_time_s, clock_range_s) -> None:
@@ -222,65 +258,47 @@ def _check(usable, time_s, fine_time_s, clock_range_s) -> None:
 
 
 def _axis(centre: float, half: float, step: float) -> np.ndarray:
-    """Grid values that contain the centre and stay within the range."""
+    """Values that contain the centre and stay within the range."""
     count = int(np.floor(half / step + 1e-9)) if half > 0 else 0
     return centre + step * np.arange(-count, count + 1)
 
 
-def _grid(centre, half, step) -> list[tuple[float, ...]]:
-    axes = [_axis(*three) for three in zip(centre, half, step, strict=True)]
-    mesh = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    return [tuple(row) for row in mesh.round(9).tolist()]
+def _square(centre: np.ndarray, half: float, step: float) -> np.ndarray:
+    """(k, 2) grid of shifts; rounded, so that a shift met twice is recognised."""
+    axes = np.meshgrid(*(_axis(value, half, step) for value in centre), indexing="ij")
+    return np.stack(axes, axis=-1).reshape(-1, 2).round(6)
 
 
-def _around(best, reach, step, centre, half) -> list[tuple[float, ...]]:
-    """Finer grids around each start, without repeats, in a fixed order."""
-    found: dict[tuple[float, ...], None] = {}
-    for start in best:
-        around = np.array(_grid(np.array(start), np.where(half > 0, reach, 0.0), step))
-        inside = np.all(np.abs(around - centre) <= half + 1e-9, axis=1)
-        found |= dict.fromkeys(tuple(row) for row in around[inside].tolist())
-    return list(found)
-
-
-def _best(scores, n_starts: int, step: np.ndarray) -> list[tuple[float, ...]]:
-    """Best candidates that are no direct neighbours of a better one."""
-    defined = [(r, candidate) for candidate, (_, r) in scores.items() if np.isfinite(r)]
-    if not defined:
+def _peaks(scores: pd.DataFrame, n_starts: int, distance_m: float) -> np.ndarray:
+    """(k, 2) best shifts that are farther than `distance_m` from every better one."""
+    ranked = scores.dropna(subset="r").sort_values("r", ascending=False, kind="stable")
+    if ranked.empty:
         raise InputError(
             "registration",
             "no candidate with a defined r",
             "fitting records and simulated light that vary",
             "Fit on a period with sun flecks, or give more sensors.",
         )
-    chosen: list[tuple[float, ...]] = []
-    for _, candidate in sorted(defined, key=lambda pair: -pair[0]):
-        offsets = np.abs(np.array(chosen).reshape(-1, 3) - candidate)
-        if not np.any(np.all(offsets <= step * 1.5, axis=1)):
-            chosen.append(candidate)
+    chosen = np.empty((0, 2))
+    for shift in ranked[["east_m", "north_m"]].to_numpy():
+        if not np.any(np.abs(chosen - shift).max(axis=1, initial=0) <= distance_m):
+            chosen = np.vstack([chosen, shift])
         if len(chosen) == n_starts:
             break
     return chosen
 
 
-def _scores(candidates, measured, usable, time_s, simulate, fine_time_s, max_shifts) -> np.ndarray:
-    """r of every candidate; candidates of one shift share one simulation."""
+def _best_clock(light, measured, usable, time_s, fine_time_s, offsets_s) -> tuple[float, float]:
+    """Clock offset with the highest r, and that r, for the light (sensor, fine time) of a shift."""
     rows, columns = np.nonzero(usable)
     target = measured[rows, columns]
-    by_shift: dict[tuple[float, float], list[int]] = {}
-    for index, (east, north, _) in enumerate(candidates):
-        by_shift.setdefault((east, north), []).append(index)
-    r = np.full(len(candidates), np.nan)
-    shifts = list(by_shift)
-    for start in range(0, len(shifts), max_shifts):
-        some = shifts[start : start + max_shifts]
-        fine = np.asarray(simulate(np.array(some)), float)
-        _check_shape(fine, (len(some), len(measured), len(fine_time_s)))
-        for light, shift in zip(fine, some, strict=True):
-            for index in by_shift[shift]:
-                true_time_s = time_s[columns] - candidates[index][2]
-                r[index] = pearson(target, _interpolate(light, rows, true_time_s, fine_time_s))
-    return r
+    r = [
+        pearson(target, _interpolate(light, rows, time_s[columns] - offset_s, fine_time_s))
+        for offset_s in offsets_s
+    ]
+    # Among equals the offset nearest to zero: a clock is right until the records say otherwise.
+    best = np.lexsort([np.abs(offsets_s), -np.nan_to_num(r, nan=-2.0)])[0]
+    return offsets_s[best], r[best]
 
 
 def _interpolate(light, rows, at_s, fine_time_s) -> np.ndarray:
@@ -296,14 +314,15 @@ def _check_shape(fine: np.ndarray, expected: tuple[int, ...]) -> None:
         raise ValueError(f"simulate() returned shape {fine.shape}, not {expected}")
 
 
-def _registration(scores, best, centre, half, n_fit) -> Registration:
-    names = ("east_m", "north_m", "clock_offset_s")
-    distance = np.abs(np.array(best) - centre)
-    edge = tuple(
-        name for name, d, h in zip(names, distance, half, strict=True) if h > 0 and d >= h - 1e-9
+def _registration(scores, centre, shift_range_m, clock_range_s, n_fit) -> Registration:
+    best = scores.loc[scores["r"].idxmax()]
+    limits = {
+        "east_m": (best["east_m"] - centre[0], shift_range_m),
+        "north_m": (best["north_m"] - centre[1], shift_range_m),
+        "clock_offset_s": (best["clock_offset_s"], clock_range_s),
+    }
+    at_edge = tuple(
+        name for name, (value, half) in limits.items() if half > 0 and abs(value) >= half - 1e-6
     )
-    table = pd.DataFrame(
-        [(level, *candidate, r) for candidate, (level, r) in scores.items()],
-        columns=["level", *names, "r"],
-    )
-    return Registration(*best, scores[best][1], n_fit, edge, table)
+    values = (float(best[name]) for name in limits)
+    return Registration(*values, float(best["r"]), n_fit, at_edge, scores.astype({"level": int}))

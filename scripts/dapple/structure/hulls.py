@@ -132,10 +132,9 @@ def _convex_hull(u, v, order, hull, tolerance):
     for i in range(n):
         order[i] = i
     _sort_by_u_then_v(u, v, order)
-    count = 0
+    count, floor = 0, 1
     for step in range(2 * n - 1):  # the lower chain from left to right, then the upper one back
         i = order[step] if step < n else order[2 * n - 2 - step]
-        floor = 1 if step < n else lower
         while count > floor:
             a, b = hull[count - 2], hull[count - 1]
             if (u[b] - u[a]) * (v[i] - v[a]) - (v[b] - v[a]) * (u[i] - u[a]) > tolerance:
@@ -144,7 +143,7 @@ def _convex_hull(u, v, order, hull, tolerance):
         hull[count] = i
         count += 1
         if step == n - 1:
-            lower = count
+            floor = count
     return count - 1
 
 

@@ -22,7 +22,6 @@ def reconstruct(
     mitre_limit: float = math.sqrt(2),
     seed: int,
     what: str = "cloud",
-    remedy: str = "Check the filters and the class threshold before this step.",
 ) -> Mesh:
     """Fit one convex planar polygon to the points of every voxel.
 
@@ -50,8 +49,8 @@ def reconstruct(
     seed : int
         Chooses the random turns. They depend on the seed and the voxel's place alone: not on
         other voxels, not on the number of threads.
-    what, remedy : str
-        What the points are and what to do where there is none, for the error message.
+    what : str
+        What the points are (leaf, wood), for the error message.
 
     Returns
     -------
@@ -79,7 +78,12 @@ def reconstruct(
     if voxel_size_m <= 0 or buffer_m < 0 or mitre_limit < 1:
         raise ValueError("voxel_size_m must be positive, buffer_m not negative, mitre_limit ≥ 1")
     if not len(points_m):
-        raise EmptyCloudError(what, "no point", "at least one", remedy)
+        raise EmptyCloudError(
+            "polygons",
+            f"no {what} points",
+            "at least one",
+            "Look at what the filters left, and check the reflectance threshold.",
+        )
     index = _voxel_index(points_m, voxel_size_m, what)
     low = index.min(axis=0)
     n_y, n_z = (index.max(axis=0) - low + 1)[1:]
@@ -105,7 +109,7 @@ def _voxel_index(points_m: np.ndarray, voxel_size_m: float, what: str) -> np.nda
     index = np.floor(points_m / voxel_size_m)
     if not np.isfinite(index).all():
         raise InputError(
-            what,
+            f"{what} points",
             f"{np.count_nonzero(~np.isfinite(index).all(axis=1))} points that are not finite",
             "finite coordinates",
             "Filter the cloud or read the file again.",
@@ -113,7 +117,7 @@ def _voxel_index(points_m: np.ndarray, voxel_size_m: float, what: str) -> np.nda
     span = index.max(axis=0) - index.min(axis=0)
     if span.max() >= _MAX_INDEX:
         raise InputError(
-            what,
+            f"{what} points",
             f"points {span.max() * voxel_size_m:.0f} m apart with voxels of {voxel_size_m} m",
             f"at most {_MAX_INDEX} voxels on a side",
             "Remove far outliers, or cut the cloud into plots.",

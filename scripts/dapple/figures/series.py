@@ -1,0 +1,163 @@
+"""Measured and simulated PAR through the day, one small panel per sensor."""
+
+from collections.abc import Sequence
+from zoneinfo import ZoneInfo
+
+import matplotlib.dates as mdates
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from dapple.errors import InputError
+from dapple.figures import style
+
+
+def choose_sensors(per_sensor: pd.DataFrame, *, reconstruction: str, count: int = 6) -> list[str]:
+    """Pick sensors evenly from the worst to the best r of one reconstruction.
+
+    Parameters
+    ----------
+    per_sensor : DataFrame
+        `reconstruction, sensor, r`.
+    reconstruction : str
+        Whose r ranks the sensors.
+    count : int
+        How many; all where there are fewer.
+
+    Returns
+    -------
+    list of str
+        Worst first.
+    """
+    own = per_sensor[per_sensor["reconstruction"] == reconstruction].dropna(subset="r")
+    ranked = own.sort_values(["r", "sensor"])["sensor"].to_list()
+    places = np.linspace(0, len(ranked) - 1, min(count, len(ranked))).round().astype(int)
+    return [ranked[place] for place in places]
+
+
+@style.styled
+def draw(
+    records: pd.DataFrame,
+    sensors: Sequence[str],
+    *,
+    timezone: str,
+    per_sensor: pd.DataFrame | None = None,
+    components_of: str | None = None,
+    columns: int = 3,
+) -> Figure:
+    """Small multiples as in Frey et al. (2025), figure 4.
+
+    Parameters
+    ----------
+    records : DataFrame
+        `reconstruction, sensor, time` (UTC), `measured, simulated` [µmol m⁻² s⁻¹]; where
+        components are drawn also `direct`, the simulated direct beam.
+    sensors : sequence of str
+        Sensors to draw, one panel each, in this order.
+    timezone : str
+        Local time zone of the site, for the note below the axis, as in "Europe/Berlin".
+    per_sensor : DataFrame, optional
+        `reconstruction, sensor, r`: writes r into the panels.
+    components_of : str, optional
+        Reconstruction whose sky and scattered light is filled in grey under its direct beam.
+    columns : int
+        Panels side by side.
+    """
+    _check(records, sensors)
+    names = tuple(records["reconstruction"].unique())
+    columns = min(columns, len(sensors))
+    rows = -(-len(sensors) // columns)
+    figure = style.new_figure(3.1 * columns + 0.4, 1.95 * rows + 0.9)
+    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    for axes, sensor in zip(panels, sensors, strict=False):
+        own = records[records["sensor"] == sensor]
+        _panel(axes, own, names, components_of)
+        axes.set_title(f"sensor {sensor}")
+        if per_sensor is not None:
+            _write_r(axes, per_sensor[per_sensor["sensor"] == sensor], names)
+    for axes in panels[len(sensors) :]:
+        axes.set_visible(False)
+    # The panels above an empty place are the lowest of their column: they show the hours too.
+    for axes in panels[max(len(sensors) - columns, 0) : len(sensors)]:
+        axes.tick_params(labelbottom=True)
+    _time_axis(panels[0], records["time"])
+    top = max(records["measured"].max(), records["simulated"].max())
+    panels[0].set_ylim(0, 1.05 * top)
+    figure.supylabel(f"PAR [{style.PAR_UNIT}]", fontsize=9)
+    figure.supxlabel(_time_note(records["time"], timezone), fontsize=9)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+    return figure
+
+
+def _panel(axes: Axes, own: pd.DataFrame, names: tuple[str, ...], components_of: str | None):
+    if components_of is not None:
+        time, simulated, direct = _line(own, components_of, "simulated", "direct")
+        text = f"{style.label(components_of)}: sky and scattered"
+        axes.fill_between(time, 0, simulated - direct, color="#DDDDDD", lw=0, label=text)
+    measured = _line(own, own["reconstruction"].iloc[0], "measured")
+    axes.plot(*measured, color=style.COLOURS["measured"], lw=1.6, alpha=0.9, label="measured")
+    for name in names:
+        line = _line(own, name, "simulated")
+        axes.plot(*line, color=style.colour(name, names), lw=1.1, label=style.label(name))
+
+
+def _line(own: pd.DataFrame, reconstruction: str, *columns: str) -> list[np.ndarray]:
+    """Times and values, with a hole where records are missing: no line across what is unknown."""
+    one = own[own["reconstruction"] == reconstruction].sort_values("time")
+    # Matplotlib would convert marked times to a zone of its own.
+    time = one["time"].dt.tz_convert("UTC").dt.tz_localize(None).to_numpy()
+    step = np.diff(time)
+    holes = np.nonzero(step > 3 * np.median(step))[0] + 1 if len(step) else []
+    values = [np.insert(one[name].to_numpy(float), holes, np.nan) for name in columns]
+    return [np.insert(time, holes, time[np.asarray(holes, int)]), *values]
+
+
+def _write_r(axes: Axes, rows: pd.DataFrame, names: tuple[str, ...]) -> None:
+    """r of each reconstruction in its colour, right-aligned above the panel."""
+    r = rows.dropna(subset="r").set_index("reconstruction")["r"]
+    words = [(f"{r[n]:.2f}".replace("-", "−"), style.colour(n, names)) for n in names if n in r]
+    if words:
+        words.insert(0, ("r =", "#555555"))
+    for place, (text, colour) in enumerate(reversed(words)):
+        axes.annotate(
+            text,
+            (1, 1),
+            xycoords="axes fraction",
+            xytext=(-27 * place, 4),
+            textcoords="offset points",
+            ha="right",
+            fontsize=8,
+            color=colour,
+        )
+
+
+def _time_axis(axes: Axes, times: pd.Series) -> None:
+    locator = mdates.AutoDateLocator(minticks=3, maxticks=6)
+    axes.xaxis.set_major_locator(locator)
+    several_days = times.min().date() != times.max().date()
+    axes.xaxis.set_major_formatter(mdates.DateFormatter("%d %b\n%H" if several_days else "%H:%M"))
+
+
+def _time_note(times: pd.Series, timezone: str) -> str:
+    local = times.min().tz_convert(ZoneInfo(timezone))
+    hours = local.utcoffset().total_seconds() / 3600
+    return f"UTC on {times.min():%d %B %Y} (local time: UTC {hours:+g} h, {timezone})"
+
+
+def _check(records: pd.DataFrame, sensors: Sequence[str]) -> None:
+    known = set(records["sensor"])
+    if unknown := [sensor for sensor in sensors if sensor not in known]:
+        raise InputError(
+            "figures.sensors",
+            ", ".join(unknown),
+            f"labels such as {', '.join(sorted(known)[:5])}",
+            "Choose sensors of the sensor table that have records.",
+        )
+    if not len(sensors):
+        raise InputError(
+            "figures.sensors", "no sensor", "at least one", "Name sensors, or let them be chosen."
+        )
+    if records["time"].dt.tz is None:
+        raise InputError("records", "naive times", "UTC", "Localise the times: tz_localize('UTC').")

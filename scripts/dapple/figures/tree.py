@@ -1,0 +1,235 @@
+"""The reconstructed tree from the side and from above, with sensors and scan positions."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import ListedColormap, Normalize, to_rgb
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from dapple.figures import style
+from dapple.formats.meshes import Mesh
+from dapple.light.scene import Scene
+
+UNKNOWN = "#E9E9EE"
+KIND_COLOURS = {"leaf": style.LEAF, "wood": style.WOOD}
+
+
+@dataclass(frozen=True)
+class View:
+    """Which axes of the local frame lie along the page, and how the third recedes."""
+
+    title: str
+    across: int
+    up: int
+    depth: int
+    nearer: float  # +1 where a larger depth coordinate is nearer to the eye
+    labels: tuple[str, str]
+
+
+SIDE = View("from the south", 0, 2, 1, -1.0, ("east [m]", "up [m]"))
+ABOVE = View("from above", 0, 1, 2, 1.0, ("east [m]", "north [m]"))
+
+
+@style.styled
+def draw(
+    scene: Scene,
+    *,
+    sensors: pd.DataFrame | None = None,
+    scan_positions_m: np.ndarray | None = None,
+    title: str = "",
+    margin_m: float = 0.4,
+) -> Figure:
+    """Two views at one scale.
+
+    Parameters
+    ----------
+    scene : Scene
+        Meshes are drawn as shaded triangles, far ones first; voxels as squares, coloured by the
+        plant area along the line of sight.
+    sensors : DataFrame, optional
+        `x_m`, `y_m`, `z_m` [m].
+    scan_positions_m : (k, 3) array, optional
+        Scanner positions [m]; those beyond the frame are marked at its edge.
+    title : str
+        Name of the reconstruction.
+    margin_m : float
+        Space around tree and sensors [m].
+    """
+    low, high = _bounds(scene, sensors)
+    low, high = low - margin_m, high + margin_m
+    low[2] = min(scene.ground_z_m, low[2] + margin_m) - 0.15
+    figure, panels, bar_axes = _panels(high - low, scene.voxels is not None)
+    norm = _density_norm(scene.voxels)
+    for axes, view in zip(panels, (SIDE, ABOVE), strict=True):
+        axes.set(
+            xlim=(low[view.across], high[view.across]),
+            ylim=(low[view.up], high[view.up]),
+            xlabel=view.labels[0],
+            ylabel=view.labels[1],
+        )
+        axes.set_title(f"{title}, {view.title}" if title else view.title)
+        axes.set_axisbelow(True)
+        _mesh_layer(axes, scene.meshes, view, low, high)
+        if scene.voxels is not None:
+            squares = _voxel_layer(axes, scene.voxels, view, norm)
+        _points(axes, view, sensors, scan_positions_m, low, high)
+    panels[0].axhline(scene.ground_z_m, color="#A89F91", linewidth=1.0, zorder=1)
+    if scene.voxels is not None:
+        bar = figure.colorbar(squares, cax=bar_axes)
+        bar.set_label("plant area along the line of sight [m² m⁻²]")
+        bar.outline.set_visible(False)
+    entries = dict(
+        pair[::-1]
+        for axes in panels
+        for pair in zip(*axes.get_legend_handles_labels(), strict=True)
+    )
+    if entries:
+        figure.legend(entries.values(), entries, loc="lower center", ncols=len(entries))
+    return figure
+
+
+def _panels(extent_m: np.ndarray, with_bar: bool) -> tuple[Figure, list[Axes], Axes | None]:
+    """Two axes at exactly one scale that stand on one line, and one for a colour bar."""
+    width, heights = 4.0, 4.0 * extent_m[[2, 1]] / extent_m[0]
+    left, gap, bottom, top = 0.6, 0.65, 0.85, 0.35
+    size = np.array([left + 2 * width + gap + (1.0 if with_bar else 0.15), bottom + top])
+    size[1] += max(heights)
+    figure = Figure(figsize=size, dpi=style.DPI)
+    places = [(left, heights[0]), (left + width + gap, heights[1])]
+    panels = [
+        figure.add_axes((x / size[0], bottom / size[1], width / size[0], height / size[1]))
+        for x, height in places
+    ]
+    if not with_bar:
+        return figure, panels, None
+    x, height = left + 2 * width + gap + 0.15, 0.8 * max(heights)
+    return (
+        figure,
+        panels,
+        figure.add_axes((x / size[0], bottom / size[1], 0.13 / size[0], height / size[1])),
+    )
+
+
+def _bounds(scene: Scene, sensors: pd.DataFrame | None) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of the box around meshes, known leaf voxels and sensors."""
+    boxes = [mesh.vertices_m for mesh in scene.meshes.values() if len(mesh.vertices_m)]
+    if scene.voxels is not None:
+        filled = _density(scene.voxels)
+        half = 0.5 * scene.voxels.attrs["voxel_size_m"]
+        places = np.argwhere(np.nan_to_num(filled) > 0)
+        centres = np.column_stack(
+            [scene.voxels[axis].to_numpy()[places[:, k]] for k, axis in enumerate("xyz")]
+        )
+        boxes += [centres - half, centres + half]
+    if sensors is not None:
+        boxes.append(sensors[["x_m", "y_m", "z_m"]].to_numpy(float))
+    boxes = [box for box in boxes if len(box)]
+    if not boxes:
+        return np.full(3, -1.0), np.full(3, 1.0)
+    points = np.concatenate(boxes)
+    return points.min(axis=0), points.max(axis=0)
+
+
+def _mesh_layer(axes: Axes, meshes: dict[str, Mesh], view: View, low, high) -> None:
+    """All triangles of all kinds in one collection, so that near leaves hide far branches."""
+    triangles, colours = [np.empty((0, 3, 3))], [np.empty((0, 3))]
+    for kind, mesh in meshes.items():
+        triangles.append(mesh.vertices_m[mesh.faces])
+        colours.append(_shaded(mesh, to_rgb(KIND_COLOURS.get(kind, "#888888")), view))
+    corners, rgb = np.concatenate(triangles), np.concatenate(colours)
+    depth = view.nearer * corners[:, :, view.depth].mean(axis=1)
+    limits = np.sort(view.nearer * np.array([low[view.depth], high[view.depth]]))
+    # Far parts fade a little towards white, which tells front from back without a third axis.
+    haze = 0.35 * (1 - np.clip((depth - limits[0]) / np.ptp(limits), 0, 1))[:, None]
+    order = np.argsort(depth, kind="stable")
+    axes.add_collection(
+        PolyCollection(
+            corners[order][:, :, [view.across, view.up]],
+            facecolors=(rgb * (1 - haze) + haze)[order],
+            edgecolors="none",
+            antialiaseds=False,  # smoothed edges leave white seams between neighbours
+            zorder=2,
+        )
+    )
+
+
+def _shaded(mesh: Mesh, rgb: tuple[float, float, float], view: View) -> np.ndarray:
+    """(t, 3) colours: bright where a triangle faces the lamp, both sides alike."""
+    lamp = np.zeros(3)
+    lamp[[view.across, view.up, view.depth]] = [-0.45, 0.55, 0.70 * view.nearer]
+    length = np.linalg.norm(mesh.triangle_normal, axis=1)
+    normal = mesh.triangle_normal / np.where(length > 0, length, 1.0)[:, None]
+    # Each element has its own tone, so that one leaf stands out from the next.
+    tone = 0.9 + 0.2 * ((mesh.element * 0.6180339887) % 1.0)
+    bright = tone * (0.55 + 0.5 * np.abs(normal @ (lamp / np.linalg.norm(lamp))))
+    return np.clip(np.asarray(rgb) * bright[:, None], 0, 1)
+
+
+def _density(voxels: xr.Dataset) -> np.ndarray:
+    return voxels["plant_area_density_m2_m3"].transpose("x", "y", "z").to_numpy()
+
+
+def _columns(voxels: xr.Dataset, depth_axis: int) -> np.ndarray:
+    """Plant area per cross section along the line of sight [m² m⁻²]; unknown voxels add nothing."""
+    return np.nansum(_density(voxels), axis=depth_axis) * voxels.attrs["voxel_size_m"]
+
+
+def _density_norm(voxels: xr.Dataset | None) -> Normalize | None:
+    if voxels is None:
+        return None
+    top = max(_columns(voxels, view.depth).max() for view in (SIDE, ABOVE))
+    return Normalize(0, top if top > 0 else 1.0)
+
+
+def _voxel_layer(axes: Axes, voxels: xr.Dataset, view: View, norm: Normalize):
+    area = _columns(voxels, view.depth)
+    unknown = np.isnan(_density(voxels)).any(axis=view.depth) & (area == 0)
+    half = 0.5 * voxels.attrs["voxel_size_m"]
+    edges = [
+        np.append(values - half, values[-1] + half)
+        for values in (voxels["xyz"[k]].to_numpy() for k in (view.across, view.up))
+    ]
+    if unknown.any():
+        grey = np.ma.masked_where(~unknown, np.ones(area.shape)).T
+        axes.pcolormesh(*edges, grey, cmap=ListedColormap([UNKNOWN]), zorder=1)
+        axes.add_patch(Rectangle((0, 0), 0, 0, color=UNKNOWN, label="unknown: too few shots"))
+    squares = np.ma.masked_where(area == 0, area).T
+    return axes.pcolormesh(*edges, squares, cmap=style.DENSITY_MAP, norm=norm, alpha=0.8, zorder=3)
+
+
+def _points(axes: Axes, view: View, sensors, scan_positions_m, low, high) -> None:
+    if sensors is not None:
+        x, y = (sensors[["x_m", "y_m", "z_m"][k]] for k in (view.across, view.up))
+        axes.scatter(
+            x, y, s=13, color=style.SENSOR, edgecolors="white", linewidths=0.5, zorder=5,
+            label="sensor",
+        )  # fmt: skip
+    if scan_positions_m is not None and len(scan_positions_m):
+        _scanners(axes, view, np.asarray(scan_positions_m, float), low, high)
+
+
+def _scanners(axes: Axes, view: View, positions_m: np.ndarray, low, high) -> None:
+    """Squares where scanners stand; from above, a wedge at the edge towards those beyond it."""
+    across_up = [view.across, view.up]
+    inside = np.all((positions_m > low)[:, :2] & (positions_m < high)[:, :2], axis=1)
+    colour = {"color": style.SCANNER, "edgecolors": "white", "linewidths": 0.5, "zorder": 6}
+    if inside.any():
+        places = positions_m[inside][:, across_up].T
+        axes.scatter(*places, s=30, marker="s", label="scan position", **colour)
+    if inside.all() or view is SIDE:
+        return
+    centre, half = 0.5 * (low + high)[across_up], 0.5 * (high - low)[across_up]
+    rays = positions_m[~inside][:, across_up] - centre
+    reach = np.linalg.norm(rays, axis=1)
+    far = f"{reach.min():.0f} to {reach.max():.0f} m" if np.ptp(reach) > 1 else f"{reach[0]:.0f} m"
+    label = f"towards a scan position ({far} from the centre)"
+    for ray in rays:
+        edge = centre + ray * np.min(0.965 * half / np.maximum(np.abs(ray), 1e-9))
+        angle = np.degrees(np.arctan2(ray[1], ray[0])) - 90
+        axes.scatter(*edge, s=55, marker=(3, 0, angle), label=label, **colour)
+        label = None

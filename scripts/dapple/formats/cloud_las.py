@@ -1,0 +1,183 @@
+"""LAS and LAZ, read in chunks, written as 1.4 with point format 6."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import laspy
+import numpy as np
+
+from dapple import frames
+from dapple.errors import InputError
+from dapple.formats.atomic import atomic
+from dapple.formats.cloud_raw import RawCloud, attribute_name
+
+STANDARD = {
+    "Intensity": "intensity",
+    "ReturnNumber": "return_number",
+    "NumberOfReturns": "number_of_returns",
+    "Classification": "classification",
+    "PointSourceId": "point_source_id",
+    "UserData": "user_data",
+    "GpsTime": "gps_time",
+    "Red": "red",
+    "Green": "green",
+    "Blue": "blue",
+}
+WRITABLE = {name for name in STANDARD if name not in ("Red", "Green", "Blue")}
+VLR_USER, VLR_ID = "dapple", 1
+"""Names the standard fields that mean something: LAS cannot tell class 0 from never classified."""
+
+CHUNK = 1_000_000
+
+
+def read(path: Path) -> RawCloud:
+    """Read a whole LAS or LAZ file, chunk by chunk."""
+    xyz, attributes, filled = None, {}, 0
+    for raw, expected in _chunks(path, CHUNK):
+        if xyz is None:
+            xyz, origin = np.empty((expected, 3)), raw.origin_m
+            attributes = {k: np.empty(expected, v.dtype) for k, v in raw.attributes.items()}
+        xyz[filled : filled + len(raw.xyz_m)] = raw.xyz_m
+        for name, values in raw.attributes.items():
+            attributes[name][filled : filled + len(values)] = values
+        filled += len(raw.xyz_m)
+    if xyz is None:
+        return RawCloud(np.empty((0, 3)))
+    named = _declared(path)
+    # A field that is 0 everywhere was never filled, unless the file says that it was.
+    kept = {
+        name: values
+        for name, values in attributes.items()
+        if name in named or name not in STANDARD or (named == set() and values.any())
+    }
+    return RawCloud(xyz, origin, kept)
+
+
+def iterate(path: Path, chunk: int) -> Iterator[RawCloud]:
+    """Chunks of at most `chunk` points with one origin and all fields."""
+    for raw, _ in _chunks(path, chunk):
+        yield raw
+
+
+def write(path: Path, raw: RawCloud, scale_m: float = 1e-4) -> None:
+    """Write LAS 1.4, point format 6; LAZ by suffix.
+
+    Attributes without a field in the point format become extra dimensions: float32 where that
+    holds the numbers, integers as they are.
+    """
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.offsets, header.scales = raw.origin_m, np.full(3, scale_m)
+    header.generating_software = "dapple"
+    extra = {name: _storable(v) for name, v in raw.attributes.items() if name not in WRITABLE}
+    header.add_extra_dims([laspy.ExtraBytesParams(n, v.dtype) for n, v in extra.items()])
+    names = ",".join(name for name in raw.attributes if name in WRITABLE)
+    header.vlrs.append(laspy.VLR(VLR_USER, VLR_ID, "fields in use", f"{names},".encode()))
+    counts = np.rint(raw.xyz_m / scale_m)
+    if counts.size and np.abs(counts).max() > np.iinfo(np.int32).max:
+        raise InputError(
+            path,
+            f"a point {np.abs(raw.xyz_m).max():.0f} m from the local origin",
+            f"at most {np.iinfo(np.int32).max * scale_m:.0f} m at a step of {scale_m} m",
+            "Use a coarser step, or an origin nearer to the points.",
+        )
+    record = laspy.ScaleAwarePointRecord.zeros(len(raw.xyz_m), header=header)
+    for axis, name in enumerate("XYZ"):
+        record[name] = counts[:, axis].astype(np.int32)
+    for name in ("return_number", "number_of_returns"):
+        record[name] = np.ones(len(raw.xyz_m), np.uint8)
+    for name, values in raw.attributes.items():
+        record[STANDARD[name] if name in WRITABLE else name] = (
+            extra[name] if name in extra else _whole(path, name, values)
+        )
+    with atomic(path) as partial, laspy.open(partial, "w", header=header) as writer:
+        writer.write_points(record)
+
+
+def _storable(values: np.ndarray) -> np.ndarray:
+    if values.dtype == bool:
+        return values.astype(np.uint8)
+    if values.dtype != np.float64:
+        return values
+    finite = values[np.isfinite(values)]
+    fits = not finite.size or np.abs(finite).max() <= np.finfo(np.float32).max
+    return values.astype(np.float32) if fits else values
+
+
+def _whole(path: Path, name: str, values: np.ndarray) -> np.ndarray:
+    """Values for an integer field of the point format, refused where they would be cut."""
+    if name == "GpsTime":
+        return values
+    largest = {"ReturnNumber": 15, "NumberOfReturns": 15, "Classification": 255, "UserData": 255}
+    limit = largest.get(name, 65535)
+    values = np.asarray(values)
+    wrong = ~((values >= 0) & (values <= limit) & (values == np.rint(values)))
+    if wrong.any():
+        raise InputError(
+            path,
+            f"{name} = {values[wrong][0]}",
+            f"whole numbers from 0 to {limit}, as LAS holds them",
+            f"Scale or rename '{name}'.",
+        )
+    return values.astype(np.uint16 if limit == 65535 else np.uint8)
+
+
+def _chunks(path: Path, chunk: int) -> Iterator[tuple[RawCloud, int]]:
+    """Points of each chunk with every field, and how many points the file announces."""
+    seen = 0
+    try:
+        with laspy.open(path, laz_backend=_backend()) as reader:
+            header = reader.header
+            origin = _origin(header)
+            for points in reader.chunk_iterator(chunk):
+                seen += len(points)
+                yield _chunk(points, header, origin), header.point_count
+    except InputError:
+        raise
+    # laspy and its LAZ back end raise many kinds of error on damaged files.
+    except Exception as error:
+        raise _damaged(path, f"{type(error).__name__}: {error}") from error
+    if seen < header.point_count:
+        raise _damaged(path, f"{seen} of the {header.point_count} points that it announces")
+
+
+def _backend():
+    backends = laspy.LazBackend.detect_available()
+    return [b for b in backends if b.name != "Lazrs"] + [b for b in backends if b.name == "Lazrs"]
+
+
+def _damaged(path: Path, found: str) -> InputError:
+    return InputError(
+        path, f"a damaged file ({found})", "a complete LAS or LAZ file", "Copy or export it again."
+    )
+
+
+def _origin(header: laspy.LasHeader) -> np.ndarray:
+    """The file's offset, unless coordinates from there are too large for float32."""
+    offset = np.asarray(header.offsets, float) + 0.0
+    corners = np.stack([header.mins, header.maxs]).astype(float)
+    if offset.any() and np.abs(corners - offset).max() <= frames.FLOAT32_LIMIT_M:
+        return offset
+    return frames.choose_origin(corners)
+
+
+def _chunk(points, header: laspy.LasHeader, origin: np.ndarray) -> RawCloud:
+    xyz = np.empty((len(points), 3))
+    shift = np.asarray(header.offsets, float) - origin
+    for axis, name in enumerate("XYZ"):
+        np.multiply(points[name], header.scales[axis], out=xyz[:, axis])
+        if shift[axis]:
+            xyz[:, axis] += shift[axis]
+    present = set(header.point_format.dimension_names)
+    attributes = {n: np.array(points[f]) for n, f in STANDARD.items() if f in present}
+    for name in header.point_format.extra_dimension_names:
+        attributes[attribute_name(name)] = np.array(points[name])
+    return RawCloud(xyz, origin, attributes, final=True)
+
+
+def _declared(path: Path) -> set[str]:
+    """Standard fields that the file says are in use; empty for files that do not say."""
+    with laspy.open(path) as reader:
+        for vlr in reader.header.vlrs:
+            if vlr.user_id == VLR_USER and vlr.record_id == VLR_ID:
+                return set(vlr.record_data_bytes().decode().split(","))
+    return set()

@@ -1,0 +1,219 @@
+"""The only place that converts axes, directions, offsets and time zones.
+
+Everywhere else: metres, right-handed, x east, y north, z up, a local origin subtracted;
+azimuth clockwise from north, zenith from straight up, and time in UTC.
+"""
+
+import difflib
+import re
+from datetime import timedelta, timezone
+from zoneinfo import ZoneInfo, available_timezones
+
+import numpy as np
+import pandas as pd
+
+from dapple.errors import InputError
+
+FLOAT32_LIMIT_M = 8192.0
+"""Up to here neighbouring float32 numbers are at most 1 mm apart (2**13 m, 24 bits)."""
+
+
+# --- directions -----------------------------------------------------------------------------
+
+
+def direction_from_angles(zenith_deg: np.ndarray, azimuth_deg: np.ndarray) -> np.ndarray:
+    """Unit vectors that point towards a place in the sky.
+
+    Parameters
+    ----------
+    zenith_deg, azimuth_deg : array_like, broadcast together to shape s
+        Zenith angle from straight up; azimuth clockwise from north, as in pvlib [°].
+
+    Returns
+    -------
+    s + (3,) float64
+        East, north, up. The sun's light travels along the negative of it.
+    """
+    zenith, azimuth = np.broadcast_arrays(np.radians(zenith_deg), np.radians(azimuth_deg))
+    horizontal = np.sin(zenith)
+    return np.stack(
+        [horizontal * np.sin(azimuth), horizontal * np.cos(azimuth), np.cos(zenith)], axis=-1
+    )
+
+
+def angles_from_direction(direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Zenith (0 to 180) and azimuth (0 to 360, clockwise from north) of vectors [°].
+
+    Vectors of shape (..., 3) of any length; the inverse of `direction_from_angles`.
+    Straight up and straight down have azimuth 0.
+    """
+    direction = np.asarray(direction, float)
+    east, north, up = np.moveaxis(direction, -1, 0)
+    zenith = np.degrees(np.arctan2(np.hypot(east, north), up))
+    azimuth = np.degrees(np.arctan2(east, north)) % 360.0
+    # A tiny negative angle rounds up to 360 in the modulo.
+    return zenith, np.where(azimuth == 360.0, 0.0, azimuth)
+
+
+def scanner_rotation(roll_deg: float, pitch_deg: float, yaw_deg: float) -> np.ndarray:
+    """Rotation from a scanner's own frame to the local frame, (3, 3).
+
+    Turns about the scanner's x by `roll_deg`, then about y by `pitch_deg`, then about z by
+    `yaw_deg`, each counter-clockwise seen from the axis' tip: v_local = R @ v_scanner.
+    """
+    (cx, cy, cz), (sx, sy, sz) = (
+        f(np.radians([roll_deg, pitch_deg, yaw_deg])) for f in (np.cos, np.sin)
+    )
+    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    return about_z @ about_y @ about_x
+
+
+# --- offsets --------------------------------------------------------------------------------
+
+
+def choose_origin(xyz_m: np.ndarray) -> np.ndarray:
+    """A local origin that lets float32 hold the coordinates to a millimetre.
+
+    Parameters
+    ----------
+    xyz_m : (n, 3) float64
+        World coordinates [m], finite.
+
+    Returns
+    -------
+    (3,) float64
+        On each axis whose coordinates exceed 8192 m the least one, floored to 10 m; else 0.
+    """
+    xyz_m = np.asarray(xyz_m, float)
+    if not len(xyz_m):
+        return np.zeros(3)
+    low, high = xyz_m.min(axis=0), xyz_m.max(axis=0)
+    too_far = np.maximum(np.abs(low), np.abs(high)) > FLOAT32_LIMIT_M
+    return np.where(too_far, np.floor(low / 10.0) * 10.0, 0.0)
+
+
+def to_local(world_m: np.ndarray, origin_m: np.ndarray) -> np.ndarray:
+    """World coordinates to the local frame, in float64, shape (..., 3) [m]."""
+    return np.asarray(world_m, np.float64) - np.asarray(origin_m, np.float64)
+
+
+def to_world(local_m: np.ndarray, origin_m: np.ndarray) -> np.ndarray:
+    """Local coordinates to the world, in float64, shape (..., 3) [m]."""
+    return np.asarray(local_m, np.float64) + np.asarray(origin_m, np.float64)
+
+
+# --- axes of other programs -----------------------------------------------------------------
+
+
+def local_to_less(xyz_m: np.ndarray) -> np.ndarray:
+    """Local (east, north, up) to the vertex order of LESS' OBJ files: v (-x, z, y)."""
+    x, y, z = np.moveaxis(np.asarray(xyz_m, float), -1, 0)
+    return np.stack([-x, z, y], axis=-1)
+
+
+def less_to_local(abc_m: np.ndarray) -> np.ndarray:
+    """A vertex `v a b c` of a LESS OBJ file to local (east, north, up): (-a, c, b)."""
+    a, b, c = np.moveaxis(np.asarray(abc_m, float), -1, 0)
+    return np.stack([-a, c, b], axis=-1)
+
+
+def local_to_dart(xyz_m: np.ndarray) -> np.ndarray:
+    """Local (east, north, up) to the vertex order of DART's OBJ files: v (y, z, x).
+
+    DART takes an OBJ file as x forward and y up, "v y z x" (pytools4dart user guide,
+    "Object 3D", CESBIO); its scenes have z up, and x and y as here.
+    """
+    x, y, z = np.moveaxis(np.asarray(xyz_m, float), -1, 0)
+    return np.stack([y, z, x], axis=-1)
+
+
+def dart_to_local(abc_m: np.ndarray) -> np.ndarray:
+    """A vertex `v a b c` of a DART OBJ file to local (east, north, up): (c, a, b)."""
+    a, b, c = np.moveaxis(np.asarray(abc_m, float), -1, 0)
+    return np.stack([c, a, b], axis=-1)
+
+
+# --- time -----------------------------------------------------------------------------------
+
+
+def find_timezone(name: str, where: str = "timezone") -> ZoneInfo | timezone:
+    """The zone of an IANA name (`Europe/Berlin`) or of an offset (`+02:00`).
+
+    Raises
+    ------
+    InputError
+        No such zone; the message names the nearest one.
+    """
+    if offset := re.fullmatch(r"([+-])(\d\d):(\d\d)", str(name)):
+        sign, hours, minutes = offset.groups()
+        delta = timedelta(hours=int(hours), minutes=int(minutes))
+        if delta < timedelta(hours=24):
+            return timezone(-delta if sign == "-" else delta)
+    known = available_timezones()
+    if name in known:
+        return ZoneInfo(name)
+    by_lower = {zone.lower(): zone for zone in known}
+    close = difflib.get_close_matches(str(name).lower(), by_lower, n=1, cutoff=0.4)
+    remedy = f"Did you mean '{by_lower[close[0]]}'?" if close else "Use UTC if times are in UTC."
+    raise InputError(
+        where,
+        f"unknown time zone '{name}'",
+        "an IANA name such as Europe/Berlin, or UTC, or an offset such as +02:00",
+        remedy,
+    )
+
+
+def to_utc(timestamps, timezone_name: str | None, where: str = "timestamps") -> pd.DatetimeIndex:
+    """Timestamps as time-zone aware UTC.
+
+    Parameters
+    ----------
+    timestamps : array_like of str, datetime or Timestamp
+        With a zone of their own, or naive.
+    timezone_name : str or None
+        The zone in which naive timestamps were written: IANA name or `+hh:mm`.
+    where : str
+        File or key to name in errors.
+
+    Returns
+    -------
+    DatetimeIndex
+        In UTC, as many and in the same order.
+
+    Raises
+    ------
+    InputError
+        A naive timestamp and no zone; an unknown zone; text that is no time; a wall-clock time
+        that daylight saving makes twofold or skips.
+    """
+    zone = None if timezone_name is None else find_timezone(timezone_name, where)
+    try:
+        index = pd.DatetimeIndex(pd.to_datetime(list(timestamps)))
+    except (ValueError, TypeError) as error:
+        raise InputError(
+            where,
+            f"text that is no time, or a mix of zones ({error})",
+            "ISO 8601 times such as 2023-08-10T12:30:00",
+            "Write all times of the column in one form.",
+        ) from error
+    if index.tz is not None:
+        return index.tz_convert("UTC")
+    if zone is None:
+        raise InputError(
+            where,
+            f"the naive timestamp {index[0] if len(index) else ''}".strip(),
+            "a time zone",
+            "Declare the zone in which the times were written, for example 'UTC' or "
+            "'Europe/Berlin', or write the offset into them (2023-08-10T12:30:00+02:00).",
+        )
+    try:
+        return index.tz_localize(zone).tz_convert("UTC")
+    except ValueError as error:
+        raise InputError(
+            where,
+            f"a time that daylight saving makes ambiguous or skips ({error})",
+            f"wall-clock times that exist once in {timezone_name}",
+            "Write the times in UTC, or with a fixed offset such as +01:00.",
+        ) from error

@@ -1,0 +1,290 @@
+"""Where the light is measured: horizontal PAR sensors."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy.spatial import cKDTree
+
+from dapple.errors import InputError
+from dapple.formats.meshes import Mesh
+
+COLUMN_NAMES = {
+    "sensor": ("sensor", "label"),
+    "x_m": ("x_m", "x"),
+    "y_m": ("y_m", "y"),
+    "z_m": ("z_m", "z"),
+}
+POSITION = ["x_m", "y_m", "z_m"]
+
+
+def read(path: str | Path, origin_m: Sequence[float] = (0.0, 0.0, 0.0)) -> pd.DataFrame:
+    """Read sensor positions from CSV.
+
+    Parameters
+    ----------
+    path : path
+        Columns `sensor` or `label`, and `x`, `y`, `z` (or `x_m` …) in world coordinates [m];
+        capitals do not matter, further columns are ignored.
+    origin_m : (3,) float
+        World coordinates of the local origin [m].
+
+    Returns
+    -------
+    pandas.DataFrame
+        `sensor` (text), `x_m`, `y_m`, `z_m` in the local frame [m], in the order of the file.
+
+    Raises
+    ------
+    InputError
+        No file, column or row; a label that is missing or repeated; a coordinate that is not a
+        number.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(path, "no file", "a CSV table of sensors", "Check the path.")
+    raw = pd.read_csv(path, dtype=str)
+    found = {str(name).strip().lower(): name for name in raw.columns}
+    sensors = pd.DataFrame(index=raw.index)
+    for name, aliases in COLUMN_NAMES.items():
+        column = next((found[alias] for alias in aliases if alias in found), None)
+        if column is None:
+            raise InputError(
+                path,
+                f"columns {', '.join(map(str, raw.columns))}",
+                f"a column {' or '.join(aliases)}",
+                "Rename the column.",
+            )
+        sensors[name] = raw[column]
+    labels = sensors["sensor"].fillna("").str.strip()
+    _check_labels(labels, path)
+    numbers = sensors[POSITION].apply(pd.to_numeric, errors="coerce")
+    wrong = ~np.isfinite(numbers).all(axis=1)
+    if wrong.any():
+        first = sensors.loc[wrong].iloc[0]
+        raise InputError(
+            path,
+            f"sensor {first['sensor']} at ({first['x_m']}, {first['y_m']}, {first['z_m']})",
+            "three numbers",
+            "Complete its coordinates or remove the sensor.",
+        )
+    local = numbers - np.asarray(origin_m, float)
+    return local.assign(sensor=labels)[["sensor", *POSITION]].reset_index(drop=True)
+
+
+def grid(
+    bounds_m: Sequence[float], spacing_m: float, height_m: float, ground_z_m: float = 0.0
+) -> pd.DataFrame:
+    """Fill a rectangle with a regular grid of sensors, centred in it.
+
+    Parameters
+    ----------
+    bounds_m : (4,) float
+        West, south, east and north edge in the local frame [m].
+    spacing_m : float
+        Distance between neighbours [m].
+    height_m, ground_z_m : float
+        Height of the sensors above the ground, and of the ground [m].
+
+    Returns
+    -------
+    pandas.DataFrame
+        `sensor`, `x_m`, `y_m`, `z_m`; labels `row_column`, both from 1, from the southwest.
+
+    Raises
+    ------
+    InputError
+        No positive spacing or a rectangle turned inside out.
+    """
+    west, south, east, north = bounds_m
+    if not (spacing_m > 0 and west <= east and south <= north):
+        raise InputError(
+            "sensor grid",
+            f"bounds {tuple(bounds_m)} and spacing {spacing_m} m",
+            "west ≤ east, south ≤ north and a positive spacing",
+            "Mend the bounds or the spacing.",
+        )
+    columns, rows = (int((b - a) / spacing_m + 1e-9) + 1 for a, b in ((west, east), (south, north)))
+    centre = (0.5 * (west + east), 0.5 * (south + north))
+    return grid_around(centre, columns, rows, spacing_m, height_m, ground_z_m)
+
+
+def grid_around(
+    centre_m: Sequence[float],
+    columns: int,
+    rows: int,
+    spacing_m: float,
+    height_m: float,
+    ground_z_m: float = 0.0,
+) -> pd.DataFrame:
+    """Place a grid of sensors around a point.
+
+    Parameters
+    ----------
+    centre_m : (2,) float
+        East and north of its middle in the local frame [m].
+    columns, rows : int
+        Number of sensors from west to east and from south to north.
+    spacing_m, height_m, ground_z_m : float
+        As in `grid`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        As from `grid`.
+    """
+    row, column = np.divmod(np.arange(rows * columns), columns)
+    return pd.DataFrame(
+        {
+            "sensor": [f"{r + 1}_{c + 1}" for r, c in zip(row, column, strict=True)],
+            "x_m": centre_m[0] + (column - 0.5 * (columns - 1)) * spacing_m,
+            "y_m": centre_m[1] + (row - 0.5 * (rows - 1)) * spacing_m,
+            "z_m": np.full(rows * columns, ground_z_m + height_m, float),
+        }
+    )
+
+
+def check(
+    sensors: pd.DataFrame,
+    meshes: Mapping[str, Mesh],
+    *,
+    bounds_m: np.ndarray | None = None,
+    margin_m: float = 30.0,
+    clearance_m: float = 0.005,
+    ground_z_m: float | None = None,
+    where: str | Path = "sensors",
+) -> None:
+    """Make sure that every sensor stands in the scene, and not in a leaf, in wood or underground.
+
+    Parameters
+    ----------
+    sensors : pandas.DataFrame
+        `sensor`, `x_m`, `y_m`, `z_m` (local frame).
+    meshes : dict of str to Mesh
+        What the sensors must keep clear of, by kind (`leaf`, `wood`); it also spans the scene.
+    bounds_m : (2, 3) float or None
+        Lowest and highest corner of further parts of the scene, such as voxels [m].
+    margin_m : float
+        How far outside the bounding box of the scene a sensor may stand [m].
+    clearance_m : float
+        Smallest distance from a surface [m].
+    ground_z_m : float or None
+        Height of the ground [m]; None: there is none.
+    where : str or path
+        The file or key, for messages.
+
+    Raises
+    ------
+    InputError
+        Names the sensor that is nearest to a surface or furthest outside, and the distance.
+    """
+    _check_labels(sensors["sensor"], where)
+    points = sensors[POSITION].to_numpy(float)
+    corners = [m.vertices_m for m in meshes.values() if len(m.vertices_m)]
+    corners += [] if bounds_m is None else [np.asarray(bounds_m, float)]
+    if corners:
+        low = np.min([c.min(axis=0) for c in corners], axis=0)
+        high = np.max([c.max(axis=0) for c in corners], axis=0)
+        outside = np.linalg.norm(np.maximum(np.maximum(low - points, points - high), 0.0), axis=1)
+        worst = int(outside.argmax())
+        if outside[worst] > margin_m:
+            raise InputError(
+                where,
+                f"sensor {sensors['sensor'].iloc[worst]} at {_text(points[worst])}, "
+                f"{outside[worst]:.1f} m outside the scene ({_text(low)} to {_text(high)})",
+                f"at most {margin_m:g} m",
+                "Check the origin and the coordinate system of the sensor table.",
+            )
+    if ground_z_m is not None and (points[:, 2] < ground_z_m).any():
+        lowest = int(points[:, 2].argmin())
+        raise InputError(
+            where,
+            f"sensor {sensors['sensor'].iloc[lowest]} {ground_z_m - points[lowest, 2]:.3f} m "
+            "below the ground",
+            f"z of at least {ground_z_m:g} m",
+            "Raise the sensor or lower the ground.",
+        )
+    for kind, mesh in meshes.items():
+        distance = surface_distance(points, mesh, clearance_m)
+        nearest = int(distance.argmin()) if len(distance) else 0
+        if len(distance) and distance[nearest] < clearance_m:
+            raise InputError(
+                where,
+                f"sensor {sensors['sensor'].iloc[nearest]} {1000 * distance[nearest]:.1f} mm "
+                f"from {kind}, in effect inside it",
+                f"at least {1000 * clearance_m:g} mm",
+                "Move the sensor, or check that sensors and scan share one frame.",
+            )
+
+
+def surface_distance(points_m: np.ndarray, mesh: Mesh, within_m: float) -> np.ndarray:
+    """Distance from points to the nearest triangle, where it is small.
+
+    Parameters
+    ----------
+    points_m : (n, 3) float
+    mesh : Mesh
+    within_m : float
+        Triangles further away than this are not looked at [m].
+
+    Returns
+    -------
+    (n,) float64
+        Exact distances [m] up to `within_m`, infinity beyond.
+    """
+    nearest = np.full(len(points_m), np.inf)
+    if not len(points_m) or not len(mesh.faces):
+        return nearest
+    triangles = mesh.vertices_m[mesh.faces]
+    centre = triangles.mean(axis=1)
+    radius = np.linalg.norm(triangles - centre[:, np.newaxis], axis=2).max(axis=1)
+    hits = cKDTree(points_m).query_ball_point(centre, radius + within_m, return_sorted=True)
+    counts = np.fromiter(map(len, hits), np.int64, len(hits))
+    if not counts.any():
+        return nearest
+    point = np.concatenate([hit for hit in hits if hit]).astype(np.int64)
+    triangle = np.repeat(np.arange(len(hits)), counts)
+    distance = _point_triangle(points_m[point], triangles[triangle])
+    np.minimum.at(nearest, point, distance)
+    return np.where(nearest <= within_m, nearest, np.inf)
+
+
+def _point_triangle(p: np.ndarray, triangle: np.ndarray) -> np.ndarray:
+    """Distances (n,) between points (n, 3) and triangles (n, 3, 3).
+
+    The nearest point is the foot on the plane where that lies inside, and on an edge otherwise.
+    """
+    corner = [triangle[:, k] for k in range(3)]
+    normal = np.cross(corner[1] - corner[0], corner[2] - corner[0])
+    length = np.linalg.norm(normal, axis=1)
+    unit = np.divide(normal, length[:, None], out=np.zeros_like(normal), where=length[:, None] > 0)
+    inside = length > 0
+    nearest = np.full(len(p), np.inf)
+    for k in range(3):
+        a, b = corner[k], corner[(k + 1) % 3]
+        along, to_point = b - a, p - a
+        inside &= np.einsum("ij,ij->i", np.cross(along, to_point), unit) >= 0
+        squared = np.maximum(np.einsum("ij,ij->i", along, along), 1e-300)
+        share = np.clip(np.einsum("ij,ij->i", to_point, along) / squared, 0.0, 1.0)
+        nearest = np.minimum(nearest, np.linalg.norm(to_point - share[:, None] * along, axis=1))
+    height = np.abs(np.einsum("ij,ij->i", p - corner[0], unit))
+    return np.where(inside, height, nearest)
+
+
+def _check_labels(labels: pd.Series, where: str | Path) -> None:
+    if labels.empty:
+        raise InputError(where, "no sensors", "at least one", "Is the file complete?")
+    if (labels == "").any() or labels.isna().any():
+        raise InputError(where, "a sensor without a label", "a label in each row", "Name it.")
+    if labels.duplicated().any():
+        raise InputError(
+            where,
+            f"sensor {labels[labels.duplicated()].iloc[0]} more than once",
+            "each label once",
+            "Remove or rename the repeated row.",
+        )
+
+
+def _text(point: np.ndarray) -> str:
+    return "(" + ", ".join(f"{value:.2f}" for value in point) + ") m"

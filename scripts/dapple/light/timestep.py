@@ -1,0 +1,262 @@
+"""Light at sensors at one time, by Mitsuba's own path tracers: the reference engine.
+
+A sensor is a level plane that answers to the cosine. Its irradiance is an integral of radiance
+over the upper hemisphere; each radiance comes from Mitsuba's `path` or `volpath` integrator,
+asked along rays that start at the sensor:
+
+* direct: rays to points of the sun's disc, no scattering;
+* sky: rays with a cosine law, no scattering, the disc left out;
+* scattered: rays with a cosine law, light that comes straight from sun and sky left out.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from dapple.errors import InputError
+from dapple.frames import direction_from_angles
+from dapple.light import patterns
+from dapple.light.mitsuba_scene import SUN_DISTANCE_M, RenderScene
+from dapple.light.sky import relative_radiance
+from dapple.streams import stream_seed
+
+LIFT_M = 1e-3
+"""A sensor that lies on the ground is lifted by this much, so that its rays leave the ground."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How many rays each sensor gets; standard errors come from the replicates.
+
+    Attributes
+    ----------
+    replicates : int
+        Independent repetitions, at least 2.
+    direct, sky, scattered : int
+        Rays per replicate for each part of the light.
+    max_depth : int
+        Longest path in segments: 2 is light scattered once.
+    roulette_depth : int
+        From this depth on weak paths are ended by chance (Mitsuba's `rr_depth`).
+    """
+
+    replicates: int = 16
+    direct: int = 128
+    sky: int = 128
+    scattered: int = 64
+    max_depth: int = 8
+    roulette_depth: int = 2
+
+    def __post_init__(self) -> None:
+        if self.replicates < 2 or min(self.direct, self.sky, self.scattered) < 1:
+            raise InputError(
+                "light.timestep",
+                f"{self.replicates} replicates of {self.direct}, {self.sky}, {self.scattered} rays",
+                "at least 2 replicates with rays for each part",
+                "Without replicates there is no standard error.",
+            )
+
+
+def timestep(
+    scene: RenderScene,
+    sensors_m: np.ndarray,
+    *,
+    sun_zenith_deg: float,
+    sun_azimuth_deg: float,
+    beam_normal: np.ndarray,
+    diffuse_horizontal: np.ndarray,
+    sky: np.ndarray | Callable[[np.ndarray, np.ndarray], np.ndarray],
+    effort: Effort,
+    seed: int,
+    aperture_m: float = 0.0,
+) -> dict[str, np.ndarray]:
+    """Irradiance of level sensors under one sun and one sky.
+
+    Parameters
+    ----------
+    scene : RenderScene
+        From `mitsuba_scene.build`; its sun and sky are set.
+    sensors_m : (n, 3) array
+        Local frame [m]; not below the ground.
+    sun_zenith_deg, sun_azimuth_deg : float
+        Azimuth clockwise from north [deg]. From zenith 90 on there is no direct light.
+    beam_normal : (b,) array
+        Irradiance of the sun on a plane that faces it, per band.
+    diffuse_horizontal : (b,) array
+        Irradiance of the open sky on the level, per band, in the same unit.
+    sky : (5,) array or callable
+        Coefficients of Perez et al. (1993) (`light.sky.relative_radiance`; zeros: isotropic), or
+        relative radiance as a function of zenith and azimuth [deg].
+    effort : Effort
+    seed : int
+    aperture_m : float
+        Diameter of the sensors' level entrance; 0 is a point [m].
+
+    Returns
+    -------
+    dict of str to array
+        `direct`, `sky`, `scattered`, `total`, `standard_error`: (n, b) in the unit of the input;
+        `par`, `par_standard_error`: (n,), sums over the bands.
+
+    Raises
+    ------
+    InputError
+        A sensor lies below the ground.
+    """
+    beam, diffuse = (np.asarray(x, dtype=np.float64) for x in (beam_normal, diffuse_horizontal))
+    sensors = _checked(np.asarray(sensors_m, dtype=np.float64), scene.ground_z_m)
+    towards_sun = direction_from_angles(sun_zenith_deg, sun_azimuth_deg)
+    if sun_zenith_deg >= 90.0:
+        beam, towards_sun = np.zeros_like(beam), np.array([0.0, 0.0, 1.0])
+    dark = np.zeros((len(sensors), effort.replicates, 3))
+    parts = {"direct": dark, "sky": dark, "scattered": dark}
+    if beam.any() or diffuse.any():
+        scene.set_sun(towards_sun, beam)
+        scene.set_sky(_radiance_function(sky, sun_zenith_deg, sun_azimuth_deg), diffuse)
+        render = partial(_hemisphere, scene, sensors, towards_sun, effort, aperture_m, seed)
+        if beam.any():
+            parts["direct"] = _direct(scene, sensors, towards_sun, effort, aperture_m, seed)
+        if diffuse.any():
+            parts["sky"] = render("sky", effort.sky)
+        parts["scattered"] = render("scattered", effort.scattered)
+    return _summary(parts, scene.n_bands)
+
+
+def _checked(sensors: np.ndarray, ground_z_m: float) -> np.ndarray:
+    lowest = sensors[:, 2].min(initial=np.inf)
+    if lowest < ground_z_m:
+        raise InputError(
+            "sensors",
+            f"a sensor at z = {lowest:.3f} m",
+            f"none below the ground at {ground_z_m:.3f} m",
+            "Lower the ground or check the sensors' heights and origin.",
+        )
+    lifted = sensors.copy()
+    lifted[:, 2] = np.maximum(lifted[:, 2], ground_z_m + LIFT_M)
+    return lifted
+
+
+def _radiance_function(sky, sun_zenith_deg: float, sun_azimuth_deg: float) -> Callable:
+    if callable(sky):
+        return sky
+    return partial(relative_radiance, np.asarray(sky), sun_zenith_deg, sun_azimuth_deg)
+
+
+def _direct(
+    scene: RenderScene,
+    sensors: np.ndarray,
+    towards_sun: np.ndarray,
+    effort: Effort,
+    aperture_m: float,
+    seed: int,
+) -> np.ndarray:
+    """(n, replicates, 3) irradiance by rays to points spread evenly over the sun's disc."""
+    seed = stream_seed(seed, "direct")
+    copies = (len(sensors), effort.replicates)
+    square = patterns.shifted(effort.direct, 4, copies, seed)
+    start = _starts(sensors, square[..., 2:], aperture_m)
+    across = _across(towards_sun)
+    radius = scene.sun_disc_m
+    goal = scene.centre_m + SUN_DISTANCE_M * towards_sun
+    goal = goal + radius * patterns.disc(square[..., :2]) @ across
+    way = goal - start
+    distance = np.linalg.norm(way, axis=-1, keepdims=True)
+    way /= distance
+    # area of the disc, seen under its slant, over distance squared: the solid angle of a sample
+    solid_angle = np.pi * radius**2 * (way @ towards_sun)[..., None] / distance**2
+    weight = solid_angle * np.maximum(way[..., 2:], 0.0)
+    integrator = {"type": scene.integrator, "max_depth": 1}
+    radiance = _radiance(scene, integrator, start, way, way[..., 2] > 0.0, seed)
+    return (radiance * weight).mean(axis=2)
+
+
+def _hemisphere(
+    scene: RenderScene,
+    sensors: np.ndarray,
+    towards_sun: np.ndarray,
+    effort: Effort,
+    aperture_m: float,
+    seed: int,
+    part: str,
+    n_rays: int,
+) -> np.ndarray:
+    """(n, replicates, 3) irradiance of the sky or of scattered light by rays with a cosine law."""
+    seed = stream_seed(seed, part)
+    square = patterns.shifted(n_rays, 4, (len(sensors), effort.replicates), seed)
+    start = _starts(sensors, square[..., 2:], aperture_m)
+    way = patterns.cosine_hemisphere(square[..., :2])
+    if part == "sky":
+        integrator = {"type": scene.integrator, "max_depth": 1}
+        # the disc is direct light; a little more than its radius, for the parallax
+        seen = way @ towards_sun < np.cos(1.05 * scene.sun_radius_rad)
+    else:
+        integrator = {
+            "type": scene.integrator,
+            "max_depth": effort.max_depth,
+            "rr_depth": effort.roulette_depth,
+            "hide_emitters": True,
+        }
+        seen = np.ones(way.shape[:-1], dtype=bool)
+    radiance = _radiance(scene, integrator, start, way, seen, seed)
+    return np.pi * radiance.mean(axis=2)
+
+
+def _radiance(
+    scene: RenderScene,
+    integrator: dict,
+    start: np.ndarray,
+    way: np.ndarray,
+    active: np.ndarray,
+    seed: int,
+) -> np.ndarray:
+    """Radiance (n, replicates, rays, 3) that arrives along rays, from a Mitsuba integrator."""
+    mi = scene.mi
+    tracer, sampler = mi.load_dict(integrator), mi.load_dict({"type": "independent"})
+    inside = scene.in_medium(start[:, 0, 0])
+    radiance = np.zeros(way.shape)
+    for medium, chosen in ((None, ~inside), (scene.medium, inside)):
+        if not chosen.any():
+            continue
+        shape = way[chosen].shape
+        origins, ways = (
+            np.ascontiguousarray(values[chosen].reshape(-1, 3).T, dtype=np.float32)
+            for values in (start, way)
+        )
+        ray = mi.RayDifferential3f(mi.Point3f(origins), mi.Vector3f(ways))
+        sampler.seed(seed, origins.shape[1])
+        mask = mi.Bool(active[chosen].ravel())
+        colour, _, _ = tracer.sample(scene.scene, sampler, ray, medium, mask)
+        radiance[chosen] = np.array(colour & mask).T.reshape(shape)
+    return radiance
+
+
+def _starts(sensors: np.ndarray, square: np.ndarray, aperture_m: float) -> np.ndarray:
+    """(n, replicates, rays, 3) points on the sensors' level entrances."""
+    level = 0.5 * aperture_m * patterns.disc(square)
+    shift = np.concatenate([level, np.zeros((*level.shape[:-1], 1))], axis=-1)
+    return sensors[:, None, None] + shift
+
+
+def _across(axis: np.ndarray) -> np.ndarray:
+    """(2, 3) unit vectors at right angles to a unit vector and to each other."""
+    helper = np.array([1.0, 0.0, 0.0]) if abs(axis[0]) < 0.7 else np.array([0.0, 1.0, 0.0])
+    first = np.cross(axis, helper)
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(axis, first)])
+
+
+def _summary(parts: dict[str, np.ndarray], n_bands: int) -> dict[str, np.ndarray]:
+    """Means over replicates per sensor and band, and the standard errors of the totals."""
+    parts = {name: values[..., :n_bands] for name, values in parts.items()}
+    total = sum(parts.values())
+    root = np.sqrt(total.shape[1])
+    par = total.sum(axis=-1)
+    return {
+        **{name: values.mean(axis=1) for name, values in parts.items()},
+        "total": total.mean(axis=1),
+        "standard_error": total.std(axis=1, ddof=1) / root,
+        "par": par.mean(axis=1),
+        "par_standard_error": par.std(axis=1, ddof=1) / root,
+    }

@@ -1,0 +1,133 @@
+import numpy as np
+import pytest
+
+from dapple.errors import InputError
+from dapple.formats.meshes import Mesh
+from dapple.light import sensors
+
+
+def leaf(z_m=2.0, side_m=0.05):
+    corners = np.array([[0, 0, z_m], [side_m, 0, z_m], [side_m, side_m, z_m], [0, side_m, z_m]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+    return Mesh(corners.astype(float), faces, np.zeros(2, np.int32))
+
+
+def at(*point):
+    table = sensors.grid_around((0.0, 0.0), 1, 1, 1.0, 0.0)
+    table.loc[0, sensors.POSITION] = point
+    return table
+
+
+def table(tmp_path, text):
+    path = tmp_path / "sensors.csv"
+    path.write_text(text)
+    return path
+
+
+def test_positions_become_local_and_keep_their_millimetres(tmp_path):
+    path = table(
+        tmp_path,
+        '"","label","X","Y","Z"\n"1","1_1",410508.15725,5317096.0095,288.6835\n'
+        '"4","1_2",410509.1255,5317095.82225,288.68\n',
+    )
+    read = sensors.read(path, (410500.0, 5317090.0, 280.0))
+    assert list(read["sensor"]) == ["1_1", "1_2"]
+    assert read.loc[0, sensors.POSITION].to_numpy(float) == pytest.approx(
+        [8.15725, 6.0095, 8.6835], abs=1e-7
+    )
+
+
+def test_a_plain_table_is_read_as_well_and_labels_stay_text(tmp_path):
+    read = sensors.read(table(tmp_path, "sensor,x_m,y_m,z_m\n007,1,2,3\n"))
+    assert read["sensor"].iloc[0] == "007"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("label,X,Y,Z\n1_1,1,2,3\n1_1,2,2,3\n", "sensor 1_1 more than once"),
+        ("label,X,Y,Z\n1_1,1,,3\n", r"sensor 1_1 at \(1, nan, 3\)"),
+        ("label,X,Y,Z\n1_1,1,east,3\n", "expected three numbers"),
+        ("label,X,Y,Z\n1_1,1,inf,3\n", "expected three numbers"),
+        ("label,X,Y,Z\n,1,2,3\n", "without a label"),
+        ("label,X,Y\n1_1,1,2\n", "a column z_m or z"),
+        ("label,X,Y,Z\n", "no sensors"),
+    ],
+)
+def test_a_broken_table_is_refused(tmp_path, text, message):
+    with pytest.raises(InputError, match=message):
+        sensors.read(table(tmp_path, text))
+
+
+def test_a_missing_table_is_refused(tmp_path):
+    with pytest.raises(InputError, match="no file"):
+        sensors.read(tmp_path / "none.csv")
+
+
+def test_a_grid_is_centred_in_its_bounds():
+    grid = sensors.grid((-1.0, 0.0, 1.2, 0.5), spacing_m=0.5, height_m=0.1, ground_z_m=3.0)
+    assert len(grid) == 5 * 2
+    assert sorted(set(grid["x_m"].round(6))) == [-0.9, -0.4, 0.1, 0.6, 1.1]
+    assert sorted(set(grid["y_m"])) == [0.0, 0.5]
+    assert set(grid["z_m"]) == {3.1}
+    assert not grid["sensor"].duplicated().any()
+    assert grid["sensor"].iloc[[0, 4, 9]].tolist() == ["1_1", "1_5", "2_5"]
+
+
+def test_a_grid_needs_bounds_and_a_spacing_that_make_sense():
+    for bounds, spacing in (((1, 0, 0, 1), 1.0), ((0, 0, 1, 1), 0.0)):
+        with pytest.raises(InputError, match="positive spacing"):
+            sensors.grid(bounds, spacing, 0.1)
+
+
+def test_the_distance_to_a_triangle_is_that_to_its_face_edge_or_corner():
+    triangle = Mesh(
+        np.array([[0.0, 0, 0], [3, 0, 0], [0, 4, 0]]),
+        np.array([[0, 1, 2]], np.int32),
+        np.zeros(1, np.int32),
+    )
+    points = np.array(
+        [[1, 1, 2], [1, 1, -2], [1.5, -3, 0], [-3, -4, 0], [6, 0, 4], [1.5 + 0.8, 2 + 0.6, 0]]
+    )
+    expected = [2, 2, 3, 5, 5, 1]  # face, face, edge, corner, corner, the slanted edge
+    assert sensors.surface_distance(points, triangle, 10.0) == pytest.approx(expected)
+    assert np.isinf(sensors.surface_distance(points, triangle, 0.5)).all()
+
+
+def test_distances_agree_with_a_dense_sampling_of_the_triangles():
+    rng = np.random.default_rng(2)
+    mesh = Mesh(
+        rng.normal(size=(30, 3)),
+        np.arange(30, dtype=np.int32).reshape(10, 3),
+        np.arange(10, dtype=np.int32),
+    )
+    points = rng.normal(size=(15, 3))
+    u, v = np.meshgrid(np.linspace(0, 1, 150), np.linspace(0, 1, 150))
+    u, v = u[u + v <= 1], v[u + v <= 1]
+    a, b, c = (mesh.vertices_m[mesh.faces[:, k]][:, None] for k in range(3))
+    dense = (a + u[:, None] * (b - a) + v[:, None] * (c - a)).reshape(-1, 3)
+    brute = np.array([np.linalg.norm(dense - p, axis=1).min() for p in points])
+    assert sensors.surface_distance(points, mesh, 100.0) == pytest.approx(brute, abs=0.02)
+
+
+def test_a_sensor_under_a_leaf_is_fine_and_one_inside_it_is_named_with_its_distance():
+    sensors.check(at(0.02, 0.02, 1.9), {"leaf": leaf()})
+    with pytest.raises(InputError, match=r"sensor 1_1 3\.0 mm from leaf"):
+        sensors.check(at(0.02, 0.02, 1.997), {"leaf": leaf()})
+    with pytest.raises(InputError, match="from wood"):
+        sensors.check(at(0.02, 0.02, 2.0), {"leaf": leaf(5.0), "wood": leaf()})
+
+
+def test_a_sensor_far_outside_the_scene_is_named_with_its_distance():
+    with pytest.raises(InputError, match=r"sensor 1_1 at .*, 99\.9 m outside the scene"):
+        sensors.check(at(99.95, 0.0, 2.0), {"leaf": leaf()})
+    sensors.check(at(99.95, 0.0, 2.0), {"leaf": leaf()}, bounds_m=np.array([[0, 0, 0], [90, 9, 9]]))
+
+
+def test_a_sensor_below_the_ground_is_refused():
+    with pytest.raises(InputError, match=r"0\.100 m below the ground"):
+        sensors.check(at(0.0, 0.0, 0.4), {"leaf": leaf()}, ground_z_m=0.5)
+
+
+def test_an_open_field_takes_sensors_anywhere():
+    sensors.check(at(500.0, 0.0, 1.0), {})
