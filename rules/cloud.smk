@@ -25,7 +25,7 @@ rule clean:
         mem_mb=4000,
     params:
         **dict(settings.clean),
-        ground_z_m=settings.cloud.ground_z_m if settings.source == "cloud" else 0.0,
+        ground_z_m=settings.ground_z_m,
         pdal=settings.tools.pdal,
         cloudcompare=settings.tools.cloudcompare,
     message:
@@ -52,6 +52,7 @@ rule classify:
         mem_mb=4000,
     params:
         **dict(settings.classify),
+        seed=stream("classify"),
     message:
         "{settings.experiment}: leaf or wood by {params.method}"
     script:

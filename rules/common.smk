@@ -25,6 +25,20 @@ except InputError as error:
 PLACEMENTS = range(settings.leaves.placements if settings.source == "wood" else 1)
 VOXELS = [name for name in settings.reconstructions if name.startswith("voxels_")]
 LIT = settings.reconstructions if settings.sensors.kind != "none" else ()
+VARIANT = f"{settings.light.variant}_ad_rgb"
+ATMOSPHERE = {
+    "precipitable_water_cm",
+    "ozone_atm_cm",
+    "aerosol_optical_depth_500nm",
+    "ground_albedo",
+}
+SKY = {
+    "site": settings.site.model_dump(exclude={"timezone"}),
+    "radiation": settings.radiation.model_dump(exclude={"path", "sky", *ATMOSPHERE}),
+    "atmosphere": {"model": settings.radiation.sky}
+    | settings.radiation.model_dump(include=ATMOSPHERE),
+}
+ENGINE = settings.light.model_dump() | {"variant": VARIANT}
 COMPARED = LIT if settings.measured.kind != "none" else ()
 
 
@@ -64,6 +78,18 @@ def data(path):
             "reads. Set data_dir in the configuration to the folder that has it."
         )
     return str(file)
+
+
+def optics():
+    """Spectra as the configuration has them, tables as files."""
+    spectra = settings.optics.model_dump()
+    for surface in ("bark", "ground"):
+        if spectra[surface]["path"]:
+            spectra[surface]["path"] = data(spectra[surface]["path"])
+    return spectra
+
+
+OPTICS = optics()
 
 
 def stream(*names):

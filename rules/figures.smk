@@ -61,6 +61,7 @@ rule series_figure:
     params:
         sensors=settings.figures.sensors,
         reconstructions=LIT,
+        timezone=settings.site.timezone,
     message:
         "{settings.experiment}: PAR through the day"
     script:
@@ -140,6 +141,8 @@ rule page:
     threads: 1
     resources:
         mem_mb=500,
+    params:
+        experiment=settings.experiment,
     message:
         "{settings.experiment}: report.html"
     script:

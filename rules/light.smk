@@ -34,10 +34,8 @@ rule registration:
         mem_mb=4000,
     params:
         **dict(settings.registration),
-        site=dict(settings.site),
-        time=dict(settings.time),
-        radiation=settings.radiation.model_dump(exclude={"path"}),
-        variant=settings.light.variant,
+        **SKY,
+        variant=VARIANT,
         seed=stream("registration"),
     message:
         "{settings.experiment}: origin of the tree's frame and offset of the clock"
@@ -72,7 +70,8 @@ rule timesteps:
     resources:
         mem_mb=4000,
     params:
-        **dict(settings.light),
+        engine=ENGINE,
+        ground_z_m=settings.ground_z_m,
         n_times=len(TIMES),
         seed=stream("timesteps"),
     message:
@@ -128,8 +127,8 @@ rule ground_map:
         times=settings.figures.map_times,
         spacing_m=settings.figures.map_spacing_m,
         margin_m=settings.figures.map_margin_m,
-        light=dict(settings.light),
-        ground_z_m=settings.cloud.ground_z_m if settings.source == "cloud" else 0.0,
+        engine=ENGINE,
+        ground_z_m=settings.ground_z_m,
         seed=stream("ground_map"),
     message:
         "{settings.experiment}: light on the ground around the tree"

@@ -182,7 +182,7 @@ else:
         params:
             **dict(settings.scan),
             seed=stream("scan"),
-            variant=settings.light.variant,
+            ground_z_m=settings.ground_z_m,
         message:
             "{settings.experiment}: scan the tree from {params.positions} positions"
         script:

@@ -27,10 +27,9 @@ rule sky:
     resources:
         mem_mb=1000,
     params:
-        site=dict(settings.site),
+        **SKY,
         time=dict(settings.time),
         n_times=len(TIMES),
-        radiation=settings.radiation.model_dump(exclude={"path"}),
     message:
         "{settings.experiment}: sun and sky at {params.n_times} times"
     script:
@@ -57,8 +56,7 @@ rule optics:
     resources:
         mem_mb=500,
     params:
-        optics=settings.optics.model_dump(),
-        data_dir=settings.data_dir,
+        **OPTICS,
     message:
         "{settings.experiment}: spectra of leaf, bark and ground"
     script:
@@ -85,7 +83,7 @@ rule sensors:
         mem_mb=1000,
     params:
         **settings.sensors.model_dump(exclude={"path"}),
-        ground_z_m=settings.cloud.ground_z_m if settings.source == "cloud" else 0.0,
+        ground_z_m=settings.ground_z_m,
     message:
         "{settings.experiment}: sensors in the local frame"
     script:

@@ -92,6 +92,7 @@ rule runtime:
         mem_mb=500,
     params:
         benchmarks=results("benchmarks"),
+        reconstructions=settings.reconstructions,
     message:
         "{settings.experiment}: time and memory of every step"
     script:

@@ -17,12 +17,10 @@ def main(snakemake):
         [meshes.read_ply(snakemake.input.leaves), meshes.read_ply(snakemake.input.wood)]
     )
     distance_m = cloudcompare.cloud_to_mesh_distance(
-        cloud.xyz_m[chosen], mesh, cloudcompare=params.cloudcompare
+        cloud.xyz_m[chosen], mesh, program=params.cloudcompare
     )
-    json.write(snakemake.output.distance, cloudcompare.summarise_distance(distance_m))
+    json.write(snakemake.output.distance, cloudcompare.summary(distance_m))
 
 
 if __name__ == "__main__":
-    from snakemake.script import snakemake
-
     run(main, snakemake)

@@ -12,6 +12,4 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    from snakemake.script import snakemake
-
     run(main, snakemake)

@@ -11,6 +11,4 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    from snakemake.script import snakemake
-
     run(main, snakemake)

@@ -15,11 +15,9 @@ def main(snakemake):
     wood = reconstruct(cloud.xyz_m[kinds == WOOD], what="wood", **settings)
     meshes.write_ply(snakemake.output.leaves, leaves)
     meshes.write_ply(snakemake.output.wood, wood)
-    truth = json.read(snakemake.input.truth[0]) if snakemake.input.truth else None
+    truth = json.read(snakemake.input.truth) if snakemake.input.truth else None
     json.write(snakemake.output.summary, summary.of_meshes(leaves, wood, truth))
 
 
 if __name__ == "__main__":
-    from snakemake.script import snakemake
-
     run(main, snakemake)

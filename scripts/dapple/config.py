@@ -24,6 +24,7 @@ LeafAngles = Literal[
 ]
 
 FREY = "Frey et al. 2025"
+RIEGL = "after the RIEGL VZ-400i"
 
 
 def _(default: Any, text: str, source: str = "") -> Any:
@@ -69,16 +70,16 @@ class Scan(Section):
     angular_step_deg: Annotated[float, Ge(0.005), Le(2)] = _(
         0.12, "angle between neighbouring shots; 0.04 in the field", FREY
     )
-    beam_divergence_mrad: NotNegative = _(
-        0.35, "full angle of the beam", "RIEGL VZ-400i data sheet"
-    )
-    sub_rays: Count = _(13, "rays that sample one beam")
-    range_noise_m: NotNegative = _(
-        0.005, "standard deviation of a range", "RIEGL VZ-400i data sheet"
-    )
-    noise_points: NotNegative = _(0.002, "isolated noise points per shot")
-    leaf_reflectance_db: float = _(-8.0, "mean reflectance of leaves at the scanner's wavelength")
-    bark_reflectance_db: float = _(-3.5, "mean reflectance of bark at the scanner's wavelength")
+    beam_divergence_mrad: NotNegative = _(0.35, "full angle of the beam", RIEGL)
+    exit_aperture_m: NotNegative = _(0.007, "diameter of the beam at the scanner", RIEGL)
+    sub_rays: Annotated[int, Ge(1), Le(64)] = _(7, "rays that sample one beam")
+    range_noise_m: NotNegative = _(0.005, "standard deviation of a range", RIEGL)
+    min_separation_m: NotNegative = _(0.8, "nearer targets merge into one mixed return")
+    max_returns: Annotated[int, Ge(1), Le(255)] = _(5, "returns of one shot")
+    noise_points_per_shot: Share = _(0.001, "isolated noise points")
+    leaf_reflectance_db: tuple[float, float] = _((-8.0, 1.5), "mean and deviation over leaves")
+    wood_reflectance_db: tuple[float, float] = _((-2.5, 1.1), "mean and deviation over wood")
+    window_margin_m: NotNegative = _(1.0, "shots that pass the tree within it are fired")
 
 
 class CloudInput(Section):
@@ -91,18 +92,15 @@ class CloudInput(Section):
     shots: Literal["none", "recorded", "scan_frame"] = _(
         "none", "misses: not known, recorded in the file (ptx), or rebuilt from scan_frame"
     )
-    ground_z_m: float | None = _(None, "height of the flat ground; null: the lowest point")
 
 
 class ScanFrame(Section):
     """The regular angular frame of a single scan, from which its misses are rebuilt."""
 
-    n_zenith: Count = _(2082, "directions from zenith_start_deg to zenith_end_deg")
-    n_azimuth: Count = _(580, "directions from azimuth_start_deg to azimuth_end_deg")
-    zenith_start_deg: float = _(30.0, "first zenith angle")
-    zenith_end_deg: float = _(130.024, "last zenith angle")
-    azimuth_start_deg: float = _(0.0, "first azimuth")
-    azimuth_end_deg: float = _(359.90, "last azimuth")
+    n_zenith: Count = _(2082, "shots in a line")
+    n_azimuth: Count = _(580, "lines")
+    zenith_deg: tuple[float, float] = _((30.0, 130.024), "first and last zenith in the scanner")
+    azimuth_deg: tuple[float, float] = _((0.0, 359.90), "first and last azimuth in the scanner")
     tilt_deg: tuple[float, float, float] = _((1.026, 0.760, -110.019), "roll, pitch, yaw")
 
 
@@ -158,6 +156,7 @@ class Site(Section):
     latitude_deg: Annotated[float, Ge(-90), Le(90)] = _(48.0009, "north", FREY)
     longitude_deg: Annotated[float, Ge(-180), Le(180)] = _(7.8003, "east", FREY)
     altitude_m: float = _(230.0, "above sea level", FREY)
+    timezone: str = _("Europe/Berlin", "IANA zone of local time, for figures")
 
 
 class Time(Section):
@@ -178,7 +177,12 @@ class Radiation(Section):
     global_column: str = _("global_W_m2", "column of global horizontal irradiance [W m⁻²]")
     diffuse_column: str = _("diffuse_W_m2", "column of diffuse horizontal irradiance [W m⁻²]")
     timezone: str = _("UTC", "IANA zone of the time stamps")
+    max_gap_min: Positive = _(60.0, "rows of the file further apart are filled by the model")
     linke_turbidity: Positive = _(3.0, "haze of the clear-sky model", "Ineichen and Perez 2002")
+    precipitable_water_cm: Annotated[float, Gt(0), Le(8)] = _(2.0, "water vapour, for the spectrum")
+    ozone_atm_cm: Annotated[float, Gt(0), Le(0.6)] = _(0.31, "ozone, for the spectrum")
+    aerosol_optical_depth_500nm: Annotated[float, Ge(0), Le(2)] = _(0.1, "haze, for the spectrum")
+    ground_albedo: Share = _(0.2, "broadband, for the spectrum of the diffuse light")
     sky: Literal["perez", "isotropic"] = _(
         "perez", "angular distribution of diffuse light", "Perez et al. 1993"
     )
@@ -236,6 +240,7 @@ class Measured(Section):
     path: str = _("", "CSV with time_utc, logger, channel, par_umolm2s, relative to data_dir")
     noise_relative: NotNegative = _(0.02, "sensor model: relative standard deviation")
     noise_umol_m2_s: NotNegative = _(2.0, "sensor model: absolute standard deviation")
+    calibration_relative: NotNegative = _(0.0, "sensor model: relative error of a whole sensor")
     clock_offset_s: float = _(0.0, "sensor model: how far the logger's clock is ahead")
 
 
@@ -255,12 +260,14 @@ class Registration(Section):
 class Light(Section):
     """The light at the sensors."""
 
-    variant: str = _("llvm_ad_rgb", "Mitsuba variant: llvm_ad_rgb, cuda_ad_rgb")
-    bands: Literal[1, 3, 61] = _(3, "spectral bands of scattered light")
-    sun_diameter_deg: NotNegative = _(0.533, "angular diameter of the solar disc")
-    sun_samples: Count = _(1024, "paths towards the sun, per sensor and time")
-    sky_samples: Count = _(1024, "paths towards the sky, per sensor and time")
-    max_depth: Annotated[int, Ge(1), Le(100)] = _(12, "longest path")
+    variant: Literal["llvm", "cuda"] = _("llvm", "Mitsuba on the processor or on an NVIDIA GPU")
+    bands: Literal[1, 3] = _(3, "groups of bands, traced together")
+    sun_diameter_deg: Positive = _(0.533, "angular diameter of the solar disc")
+    replicates: Annotated[int, Ge(2)] = _(16, "independent repetitions: the standard error")
+    direct_rays: Count = _(64, "rays to the sun, per sensor, time and replicate")
+    sky_rays: Count = _(64, "rays to the sky, likewise")
+    scattered_rays: Count = _(32, "paths of scattered light, likewise")
+    max_depth: Annotated[int, Ge(2), Le(100)] = _(8, "longest path in segments")
 
 
 class Statistics(Section):
@@ -300,6 +307,7 @@ class Settings(Section):
     reconstructions: tuple[str, ...] = _(
         ("polygons", "voxels_0.2", "voxels_1.0", "truth"), "what light is computed for"
     )
+    ground_z_m: float = _(0.0, "height of the flat ground in the tree's frame")
     wood_path: str = _("", "OBJ of wood polygons in LESS axes (source: wood), relative to data_dir")
     plant: Plant = Plant()
     leaves: Leaves = Leaves()

@@ -59,11 +59,13 @@ def readme() -> str:
     rows = [
         "# Configuration",
         "",
-        "A run merges `config/config.yaml` (the defaults below) with the file given as `--configfile`",
-        "and with `--config key=value`. A file needs only the keys that differ. The merged",
-        "configuration is written to `results/{experiment}/config.yaml`. Units are part of the names.",
+        "A run merges `config/config.yaml` (the defaults below) with the file given as",
+        "`--configfile` and with `--config key=value`. A file needs only the keys that differ. The",
+        "merged configuration is written to `results/{experiment}/config.yaml`. Units are part of",
+        "the names.",
         "",
-        f"This page, `config.yaml` and `schema.json` are made from `scripts/dapple/config.py` by `{MEND}`.",
+        "This page, `config.yaml` and `schema.json` are made from `scripts/dapple/config.py` by",
+        f"`{MEND}`.",
         "",
     ]
     return "\n".join([*rows, *_tables(Settings(), "", "General")]) + "\n"

@@ -10,6 +10,7 @@ from scipy.special import expn
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
 from dapple.light import mitsuba_scene
+from dapple.light.phase import phase_function
 from dapple.light.scene import Optics, Scene, group_bands, group_flux
 from dapple.light.shadow import sun_visibility
 from dapple.light.sky import diffuse_normalisation, relative_radiance
@@ -86,11 +87,9 @@ def voxels(density, size=1.0, low=(0.0, 0.0, 0.0), **attributes):
     )
 
 
-def slab(leaf_area_index, half_width_m=200.0, bottom_m=2.0):
-    """A wide turbid layer of one voxel's thickness per metre, with coarse voxels."""
-    n, size = 8, half_width_m / 4.0
-    density = np.full((n, n, 1), leaf_area_index / size)
-    return voxels(density, size, (-half_width_m, -half_width_m, bottom_m))
+def slab(leaf_area_index):
+    """A turbid layer, 1 m thick and 200 m wide, 2 m above the ground."""
+    return voxels(np.full((200, 200, 1), leaf_area_index), 1.0, (-100.0, -100.0, 2.0))
 
 
 def test_the_open_sky_gives_beam_and_diffuse_light():
@@ -124,21 +123,29 @@ def test_a_wall_shades_from_the_side_on_which_it_stands(azimuth):
     out, along = np.array([np.sin(angle), np.cos(angle), 0.0]), np.array([0.0, 0.0, 100.0])
     side = 100.0 * np.array([np.cos(angle), -np.sin(angle), 0.0])
     wall = quad([0.01 * out + s * side + t * along for s, t in ((-1, 0), (1, 0), (1, 1), (-1, 1))])
-    scene = mitsuba_scene.build(Scene({"wood": wall}), optics())
-    # a sky brighter in the east by 80 % of the direction's eastward part
-    sky = lambda z, a: 1.0 + 0.8 * np.sin(np.radians(z)) * np.sin(np.radians(a))  # noqa: E731
-    found = [light(scene, azimuth=azimuth + d, sky=sky, effort=Effort(sky=1024)) for d in (0, 180)]
-    assert (found[0]["direct"] == 0.0).all()
-    assert found[1]["direct"][0] == pytest.approx(BEAM * np.cos(np.radians(30.0)), rel=1e-3)
-    visible = 0.5 - 0.8 * (2.0 / 3.0) / np.pi * np.sin(angle)
-    assert found[0]["sky"][0] == pytest.approx(visible * DIFFUSE, rel=5e-3)
+    scene = mitsuba_scene.build(Scene({"wood": wall}), optics(bark=0.5))
+
+    def sky(z, a):
+        """Brighter by 60 % of the direction's eastward and 30 % of its northward part."""
+        z, a = np.radians(z), np.radians(a)
+        return 1.0 + np.sin(z) * (0.6 * np.sin(a) + 0.3 * np.cos(a))
+
+    behind = light(scene, azimuth=azimuth, sky=sky, effort=Effort(sky=1024))
+    assert (behind["direct"] == 0.0).all()
+    visible = 0.5 - (2.0 / 3.0) / np.pi * (0.6 * out[0] + 0.3 * out[1])
+    assert behind["sky"][0] == pytest.approx(visible * DIFFUSE, rel=5e-3)
+
+    before = light(scene, azimuth=azimuth + 180.0, diffuse=0.0 * DIFFUSE)
+    assert before["direct"][0] == pytest.approx(BEAM * np.cos(np.radians(30.0)), rel=1e-3)
+    # half of what the sensor sees is a wall that reflects half of the beam
+    assert before["scattered"][0] == pytest.approx(0.25 * BEAM * np.sin(np.radians(30.0)), rel=0.02)
 
 
 @pytest.mark.parametrize("radius", [0.5, 2.0])
 def test_a_black_disc_overhead_hides_its_share_of_the_sky(radius):
     scene = mitsuba_scene.build(Scene({"leaf": disc(radius, 1.0)}), optics())
-    found = light(scene, zenith=0.0, effort=Effort(sky=512))
-    assert found["sky"][0] == pytest.approx(DIFFUSE / (1.0 + radius**2), rel=4e-3)
+    found = light(scene, zenith=0.0, effort=Effort(sky=2048))
+    assert found["sky"][0] == pytest.approx(DIFFUSE / (1.0 + radius**2), rel=5e-3)
     assert (found["direct"] == 0.0).all()
 
 
@@ -146,8 +153,7 @@ def test_the_sun_is_a_disc_with_a_penumbra():
     radius = 4.0 * np.tan(np.radians(0.265))
     scene = mitsuba_scene.build(Scene({"leaf": level((0.0, 50.0), (-50.0, 50.0), 4.0)}), optics())
     edge = np.array([-1.1, -0.7, -0.2, 0.0, 0.4, 0.9, 1.1])
-    # the far disc faces the scene's middle, at x = 25: by parallax it stands 1e-3 m off
-    sensors = np.column_stack([edge * radius - 4.0 * 25.0 / 1e5, np.zeros((7, 2))])
+    sensors = np.column_stack([edge * radius, np.zeros((7, 2))])
     found = light(scene, sensors, zenith=0.0, effort=Effort(direct=512))
     s = np.clip(edge, -1.0, 1.0)
     expected = (np.arccos(s) - s * np.sqrt(1.0 - s * s)) / np.pi
@@ -178,7 +184,7 @@ def test_light_between_a_sheet_and_the_ground_sums_a_geometric_series():
 
 @pytest.mark.parametrize("form", ["polygons", "voxels"])
 def test_in_a_furnace_every_sensor_sees_the_same_light(form):
-    conserving = optics(rho=[0.9, 0.5, 0.2], tau=[0.1, 0.5, 0.8], bark=1.0, ground=1.0)
+    conserving = optics(rho=[0.55, 0.5, 0.45], tau=[0.45, 0.5, 0.55], bark=1.0, ground=1.0)
     trunk = level((-0.3, 0.3), (-0.3, 0.3), 1.2)
     if form == "polygons":
         meshes = {"leaf": leaves(150, 0.4, (-1, -1, 0.6), (1, 1, 2.0), 3), "wood": trunk}
@@ -191,7 +197,7 @@ def test_in_a_furnace_every_sensor_sees_the_same_light(form):
     found = light(mitsuba_scene.build(scene, conserving), sensors, beam=0.0 * BEAM, effort=effort)
     error = 4.5 * found["standard_error"] + 1e-3 * DIFFUSE
     assert (np.abs(found["total"] - DIFFUSE) < error).all()
-    assert (found["standard_error"] < 0.01 * DIFFUSE).all()
+    assert (found["standard_error"] < 0.02 * DIFFUSE).all()
 
 
 @pytest.mark.parametrize("leaf_area_index", [0.5, 3.0])
@@ -233,8 +239,6 @@ def test_every_voxel_stands_where_its_coordinates_say():
 
 
 def test_light_scattered_once_in_a_turbid_layer_follows_the_phase_function():
-    from dapple.light.phase import phase_function
-
     rho, tau, depth = np.array([0.6, 0.0, 0.2]), np.array([0.0, 0.6, 0.4]), 0.5 * 0.8
     scene = mitsuba_scene.build(Scene(voxels=slab(0.8)), optics(rho=rho, tau=tau))
     found = light(
@@ -273,10 +277,11 @@ def test_standard_errors_are_what_repetition_shows():
     )
     sensors = np.random.default_rng(1).uniform(-1.0, 1.0, (40, 3)) * [1.0, 1.0, 0.0]
     effort = Effort(replicates=16, direct=8, sky=8, scattered=8)
-    runs = [light(scene, sensors, effort=effort, seed=seed) for seed in range(24)]
-    spread = np.std([run["par"] for run in runs], axis=0, ddof=1)
-    told = np.sqrt(np.mean([run["par_standard_error"] ** 2 for run in runs], axis=0))
-    assert np.sqrt((spread**2).mean() / (told**2).mean()) == pytest.approx(1.0, abs=0.12)
+    runs = [light(scene, sensors, effort=effort, seed=seed) for seed in range(20)]
+    spread = np.var([run["par"] for run in runs], axis=0, ddof=1)
+    told = np.mean([run["par_standard_error"] ** 2 for run in runs], axis=0)
+    # each ratio scatters by a third, and there are 40 of them
+    assert (spread / told).mean() == pytest.approx(1.0, abs=0.2)
 
 
 def test_the_same_seed_gives_the_same_numbers_and_another_seed_others():
@@ -304,7 +309,7 @@ def test_night_is_dark_and_dusk_has_no_beam():
 
 
 def test_few_groups_of_bands_do_for_all_bands():
-    nm = np.arange(400.0, 701.0, 5.0)
+    nm = np.arange(400.0, 701.0, 15.0)
     green = np.exp(-(((nm - 550.0) / 40.0) ** 2))
     edge = np.clip((nm - 685.0) / 15.0, 0.0, 1.0)
     full = Optics(
@@ -327,7 +332,7 @@ def test_few_groups_of_bands_do_for_all_bands():
     def bands(chosen):
         return Optics(*(getattr(full, name)[chosen] for name in full.__dataclass_fields__))
 
-    triples = [slice(k, k + 3) for k in range(0, 61, 3)]
+    triples = [slice(k, k + 3) for k in range(0, 21, 3)]
     exact = sum(par(bands(k), beam[k], diffuse[k]) for k in triples)
     level = beam.sum() * np.cos(np.radians(30.0)) + diffuse.sum()
     for n, error in ((1, 0.004), (3, 0.001)):
@@ -353,7 +358,7 @@ def test_groups_of_bands_keep_flux_and_means():
     [
         ("below the ground", lambda: light(mitsuba_scene.build(Scene(), optics()), ORIGIN - 0.1)),
         ("61 bands", lambda: mitsuba_scene.build(Scene(), optics(n=61))),
-        ("at most 1", lambda: mitsuba_scene.build(Scene(), optics(rho=0.7, tau=0.5))),
+        ("leaf_albedo", lambda: mitsuba_scene.build(Scene(), optics(rho=0.7, tau=0.5))),
         ("kind", lambda: mitsuba_scene.build(Scene({"fruit": disc(1.0, 1.0)}), optics())),
         ("replicates", lambda: Effort(replicates=1)),
         (

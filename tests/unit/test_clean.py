@@ -11,6 +11,7 @@ from dapple import programs
 from dapple.cloud import cloudcompare, pdal, voxels
 from dapple.cloud.clean import clean, thin
 from dapple.errors import EmptyCloudError, InputError
+from dapple.formats import clouds
 from dapple.formats.clouds import Cloud
 
 ORIGIN_M = np.array([410500.0, 5317080.0, 280.0])
@@ -114,6 +115,13 @@ def test_a_cloud_without_reflectance_skips_those_filters_and_says_so(tmp_path):
     ]
 
 
+def test_the_spelling_of_a_dimension_does_not_matter(tmp_path):
+    xyz_m = blob_with_strays(n=100)
+    bright = np.where(np.arange(len(xyz_m)) < 60, -3, -30).astype(np.float32)
+    path = write_laz(tmp_path / "scan.laz", xyz_m, reflectance=bright)
+    assert clean(path, tmp_path / "clean.laz", outlier_backend="none")["after_reflectance"] == 60
+
+
 def test_points_below_the_given_height_go_and_those_at_it_stay(tmp_path):
     xyz_m = np.stack([np.arange(40) * 0.1, np.zeros(40), np.arange(40) * 0.05], axis=1)
     path = write_laz(tmp_path / "line.laz", xyz_m)
@@ -155,6 +163,21 @@ def test_the_local_frame_and_the_scan_attributes_survive(tmp_path):
     np.testing.assert_allclose(cleaned_m, xyz_m, atol=1e-6)
     np.testing.assert_array_equal(las.point_source_id, scan)
     np.testing.assert_array_equal(las.TrueClass == 4, scan < 4)
+
+
+def test_fields_in_use_stay_in_use_even_where_they_are_zero(tmp_path):
+    n = 200
+    attributes = {
+        "Classification": np.zeros(n, np.uint8),
+        "PointSourceId": np.zeros(n, np.uint16),
+        "Reflectance": np.full(n, -3.0, np.float32),
+    }
+    cloud = Cloud(np.random.default_rng(1).random((n, 3)), ORIGIN_M, attributes)
+    clouds.write(tmp_path / "scan.laz", cloud)
+    clean(tmp_path / "scan.laz", tmp_path / "clean.laz", outlier_backend="none", thin_voxel_m=None)
+    cleaned = clouds.read(tmp_path / "clean.laz")
+    assert set(cleaned.attributes) == set(attributes)
+    np.testing.assert_array_equal(cleaned.origin_m, ORIGIN_M)
 
 
 def test_the_same_scan_gives_the_same_bytes(tmp_path):
@@ -226,10 +249,10 @@ def test_an_empty_a_missing_and_a_foreign_file_are_told_apart(tmp_path):
     empty = write_laz(tmp_path / "empty.laz", np.empty((0, 3)))
     with pytest.raises(EmptyCloudError, match="no points"):
         clean(empty, tmp_path / "clean.laz")
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match="no file"):
         clean(tmp_path / "missing.laz", tmp_path / "clean.laz")
     (tmp_path / "text.laz").write_text("X Y Z\n1 2 3\n" * 100)
-    with pytest.raises(InputError, match="a file that cannot be read"):
+    with pytest.raises(InputError, match="damaged file"):
         clean(tmp_path / "text.laz", tmp_path / "clean.laz")
 
 

@@ -122,6 +122,11 @@ def test_one_sensor_has_no_interval_and_says_why(caplog):
     assert "one sensor" in caplog.text
 
 
+def test_the_interval_of_two_sensors_is_called_too_narrow(caplog):
+    correlation.overall(records(n_sensors=2, noise=400.0), seed=1)
+    assert "only 2 sensors: the limits are too narrow" in caplog.text
+
+
 def test_a_minute_by_minute_afternoon_is_resampled_in_seconds():
     data = records(n_sensors=36, n_times=400)
     correlation.overall(records(), seed=1, n_bootstrap=10)  # starts R

@@ -6,9 +6,9 @@ import xarray as xr
 from dapple.errors import InputError
 from dapple.formats.light import time_coordinate
 from dapple.light import measured
-from dapple.light.times import time_series
+from dapple.light.times import time_range
 
-TIMES = time_series("2023-08-10 10:00", "2023-08-10 13:20", 1, "UTC")
+TIMES = time_range("2023-08-10 10:00", "2023-08-10 13:20", 1, "UTC")
 
 
 def light(par, labels=("1_1",), times=TIMES):
@@ -70,9 +70,9 @@ def test_missing_files_columns_and_time_zones_are_refused(tmp_path):
     path.write_text("sensor,time,par\n1_3,2023-08-10 10:10:00,5\n")
     with pytest.raises(InputError, match="columns par_umolm2s, time_utc"):
         measured.read(path)
-    with pytest.raises(InputError, match="without a time zone"):
+    with pytest.raises(InputError, match="naive timestamp"):
         measured.read(path, time_column="time", par_column="par")
-    read = measured.read(path, time_column="time", par_column="par", time_zone="Europe/Berlin")
+    read = measured.read(path, time_column="time", par_column="par", timezone="Europe/Berlin")
     assert read["time"].dt.hour.tolist() == [8]
 
 

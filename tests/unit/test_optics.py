@@ -72,6 +72,8 @@ def test_a_surface_is_a_number_a_table_or_a_file(tmp_path):
     expected = surfaces.reflectance(table, BANDS)
     assert expected[20] == pytest.approx(0.2)  # 500 nm: 0.09 + 110 × 0.001
     assert surfaces.reflectance(path, BANDS) == pytest.approx(expected)
+    with_path = {"wavelength_nm": (400.0, 700.0), "reflectance": (0.9, 0.9), "path": path}
+    assert surfaces.reflectance(with_path, BANDS) == pytest.approx(expected)
     assert surfaces.reflectance(0.2, BANDS) == pytest.approx(np.full(61, 0.2))
 
 

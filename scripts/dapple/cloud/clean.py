@@ -15,6 +15,7 @@ from dapple.cloud import pdal as pdal_program
 from dapple.cloud import voxels
 from dapple.errors import EmptyCloudError, InputError
 from dapple.formats import clouds
+from dapple.formats.cloud_raw import attribute_name
 from dapple.formats.clouds import Cloud
 
 OUTLIER_BACKENDS = ("cloudcompare", "pdal", "none")
@@ -115,16 +116,15 @@ def clean(
             f"one of {', '.join(OUTLIER_BACKENDS)}",
             "Change the configuration.",
         )
-    header = _header(points_path)
-    names = set(header.point_format.dimension_names)
+    names, origin_m = _dimensions_and_origin(points_path)
     skipped: list[str] = []
     steps = _steps(names, min_reflectance_db, max_deviation, skipped)
     if min_height_m is not None:
-        z_m = header.offsets[2] + ground_z_m + min_height_m
+        z_m = origin_m[2] + ground_z_m + min_height_m
         steps = {"height": [pdal_program.keep("Z", f"[{z_m:.4f}:]")], **steps}
     if outlier_backend == "pdal":
         steps["outliers"] = pdal_program.remove_outliers(outlier_neighbours, outlier_multiplier)
-    counts, cloud = _filter(points_path, steps, header.offsets, pdal)
+    counts, cloud = _filter(points_path, steps, origin_m, pdal)
     versions = {"pdal": pdal_program.version(pdal)}
 
     if outlier_backend == "cloudcompare":
@@ -202,26 +202,20 @@ def _most_frequent(values: np.ndarray, groups: voxels.Groups) -> np.ndarray:
     return value[run][best][first]
 
 
-def _header(path: str | Path) -> laspy.LasHeader:
-    if not Path(path).is_file():
-        raise InputError(path, "no such file", "a LAS or LAZ file", "Check the path of the scan.")
-    try:
-        with laspy.open(path) as file:
-            header = file.header
-    except (laspy.LaspyException, OSError, ValueError) as error:
-        raise InputError(
-            path,
-            f"a file that cannot be read ({error})",
-            "LAS or LAZ",
-            "Convert the scan to LAZ, or fetch the file again if it is truncated.",
-        ) from error
-    if header.point_count == 0:
+def _dimensions_and_origin(path: str | Path) -> tuple[dict[str, str], np.ndarray]:
+    """Our names of the dimensions with those in the file, and the origin of the local frame."""
+    if Path(path).suffix.lower() not in (".las", ".laz"):
+        raise InputError(path, "another format", "LAS or LAZ", "Bring the scan into LAZ first.")
+    first = next(clouds.iterate(path, 1), None)
+    if first is None:
         raise EmptyCloudError(path, "no points", "a scan", "Check how the file was exported.")
-    return header
+    with laspy.open(path) as file:
+        names = file.header.point_format.dimension_names
+        return {attribute_name(name): name for name in names}, first.origin_m
 
 
 def _steps(
-    names: set[str],
+    names: dict[str, str],
     min_reflectance_db: float | None,
     max_deviation: float | None,
     skipped: list[str],
@@ -238,7 +232,7 @@ def _steps(
         elif dimension not in names:
             skipped.append(f"{step}: the points have no dimension {dimension}")
         else:
-            steps[step] = [pdal_program.keep(dimension, interval.format(limit))]
+            steps[step] = [pdal_program.keep(names[dimension], interval.format(limit))]
     return steps
 
 

@@ -72,7 +72,7 @@ def remove_outliers(neighbours: int, multiplier: float) -> list[dict]:
 
 
 def write_las(path: str | Path, offset_m, scale_m: float = 1e-4) -> dict:
-    """A stage that writes LAS 1.4, point format 6, with every extra dimension.
+    """A stage that writes LAS 1.4, point format 6, with every extra dimension and header record.
 
     Parameters
     ----------
@@ -91,6 +91,7 @@ def write_las(path: str | Path, offset_m, scale_m: float = 1e-4) -> dict:
         "minor_version": 4,
         "dataformat_id": 6,
         "extra_dims": "all",
+        "forward": "vlr",
         **{f"offset_{axis}": offset for axis, offset in axes.items()},
         **{f"scale_{axis}": scale_m for axis in axes},
     }

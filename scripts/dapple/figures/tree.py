@@ -6,15 +6,16 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
 from matplotlib.colors import ListedColormap, Normalize, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from dapple.figures import style
+from dapple.figures import raster, style
 from dapple.formats.meshes import Mesh
 from dapple.light.scene import Scene
 
+PANEL_IN = 4.0  # width of one view
+HAZE = 0.35
 UNKNOWN = "#E9E9EE"
 KIND_COLOURS = {"leaf": style.LEAF, "wood": style.WOOD}
 
@@ -49,7 +50,7 @@ def draw(
     Parameters
     ----------
     scene : Scene
-        Meshes are drawn as shaded triangles, far ones first; voxels as squares, coloured by the
+        Meshes are drawn as shaded triangles, near ones in front; voxels as squares, coloured by the
         plant area along the line of sight.
     sensors : DataFrame, optional
         `x_m`, `y_m`, `z_m` [m].
@@ -95,7 +96,7 @@ def draw(
 
 def _panels(extent_m: np.ndarray, with_bar: bool) -> tuple[Figure, list[Axes], Axes | None]:
     """Two axes at exactly one scale that stand on one line, and one for a colour bar."""
-    width, heights = 4.0, 4.0 * extent_m[[2, 1]] / extent_m[0]
+    width, heights = PANEL_IN, PANEL_IN * extent_m[[2, 1]] / extent_m[0]
     left, gap, bottom, top = 0.6, 0.65, 0.85, 0.35
     size = np.array([left + 2 * width + gap + (1.0 if with_bar else 0.15), bottom + top])
     size[1] += max(heights)
@@ -136,25 +137,29 @@ def _bounds(scene: Scene, sensors: pd.DataFrame | None) -> tuple[np.ndarray, np.
 
 
 def _mesh_layer(axes: Axes, meshes: dict[str, Mesh], view: View, low, high) -> None:
-    """All triangles of all kinds in one collection, so that near leaves hide far branches."""
-    triangles, colours = [np.empty((0, 3, 3))], [np.empty((0, 3))]
+    """All triangles of all kinds in one picture, so that near leaves hide far branches."""
+    page = [view.across, view.up]
+    corners, colours = [np.empty((0, 3, 3))], [np.empty((0, 3))]
     for kind, mesh in meshes.items():
-        triangles.append(mesh.vertices_m[mesh.faces])
-        colours.append(_shaded(mesh, to_rgb(KIND_COLOURS.get(kind, "#888888")), view))
-    corners, rgb = np.concatenate(triangles), np.concatenate(colours)
-    depth = view.nearer * corners[:, :, view.depth].mean(axis=1)
-    limits = np.sort(view.nearer * np.array([low[view.depth], high[view.depth]]))
-    # Far parts fade a little towards white, which tells front from back without a third axis.
-    haze = 0.35 * (1 - np.clip((depth - limits[0]) / np.ptp(limits), 0, 1))[:, None]
-    order = np.argsort(depth, kind="stable")
-    axes.add_collection(
-        PolyCollection(
-            corners[order][:, :, [view.across, view.up]],
-            facecolors=(rgb * (1 - haze) + haze)[order],
-            edgecolors="none",
-            antialiaseds=False,  # smoothed edges leave white seams between neighbours
-            zorder=2,
-        )
+        triangles = mesh.vertices_m[mesh.faces][:, :, [*page, view.depth]]
+        triangles[:, :, 2] *= view.nearer
+        rgb = _shaded(mesh, to_rgb(KIND_COLOURS.get(kind, "#888888")), view)
+        # Far parts fade towards white, which tells front from back without a third axis.
+        limits = np.sort(view.nearer * np.array([low[view.depth], high[view.depth]]))
+        nearness = (triangles[:, :, 2].mean(axis=1) - limits[0]) / np.ptp(limits)
+        haze = HAZE * (1 - np.clip(nearness, 0, 1))[:, None]
+        corners.append(triangles)
+        colours.append(rgb * (1 - haze) + haze)
+    image = raster.render(
+        np.concatenate(corners),
+        np.concatenate(colours),
+        low[page],
+        high[page],
+        width_px=round(PANEL_IN * style.DPI),
+    )
+    extent = (*axes.get_xlim(), *axes.get_ylim())
+    axes.imshow(
+        image, extent=extent, origin="lower", interpolation="nearest", aspect="auto", zorder=2
     )
 
 

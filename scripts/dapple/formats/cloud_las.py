@@ -27,6 +27,9 @@ WRITABLE = {name for name in STANDARD if name not in ("Red", "Green", "Blue")}
 VLR_USER, VLR_ID = "dapple", 1
 """Names the standard fields that mean something: LAS cannot tell class 0 from never classified."""
 
+PDAL_OWN = {"ClassFlags"}
+"""Extra dimensions that PDAL adds by itself when it keeps all."""
+
 CHUNK = 1_000_000
 
 
@@ -68,6 +71,7 @@ def write(path: Path, raw: RawCloud, scale_m: float = 1e-4) -> None:
     header = laspy.LasHeader(point_format=6, version="1.4")
     header.offsets, header.scales = raw.origin_m, np.full(3, scale_m)
     header.generating_software = "dapple"
+    header.global_encoding.wkt = True  # point formats 6 to 10 ask for it, PDAL complains without
     extra = {name: _storable(v) for name, v in raw.attributes.items() if name not in WRITABLE}
     header.add_extra_dims([laspy.ExtraBytesParams(n, v.dtype) for n, v in extra.items()])
     names = ",".join(name for name in raw.attributes if name in WRITABLE)
@@ -170,7 +174,8 @@ def _chunk(points, header: laspy.LasHeader, origin: np.ndarray) -> RawCloud:
     present = set(header.point_format.dimension_names)
     attributes = {n: np.array(points[f]) for n, f in STANDARD.items() if f in present}
     for name in header.point_format.extra_dimension_names:
-        attributes[attribute_name(name)] = np.array(points[name])
+        if name not in PDAL_OWN:
+            attributes[attribute_name(name)] = np.array(points[name])
     return RawCloud(xyz, origin, attributes, final=True)
 
 

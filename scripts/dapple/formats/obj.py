@@ -45,17 +45,18 @@ def read(path: str | Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     vertices: list[list[float]] = []
     faces: list[list[int]] = []
     try:
-        for number, line in enumerate(path.open(encoding="utf-8", errors="replace"), start=1):
-            if line.startswith("v "):
-                x, y, z = line.split()[1:4]
-                vertices.append([float(x), float(y), float(z)])
-            elif line.startswith("f "):
-                corners = [int(word.split("/")[0]) for word in line.split()[1:]]
-                faces.append([i - 1 if i > 0 else len(vertices) + i for i in corners])
+        with path.open(encoding="utf-8", errors="replace") as file:
+            for number, line in enumerate(file, start=1):  # noqa: B007
+                if line.startswith("v "):
+                    x, y, z = line.split()[1:4]
+                    vertices.append([float(x), float(y), float(z)])
+                elif line.startswith("f "):
+                    corners = [int(word.split("/")[0]) for word in line.split()[1:]]
+                    faces.append([i - 1 if i > 0 else len(vertices) + i for i in corners])
     except ValueError as error:
         raise InputError(
             path,
-            f"line {number}: `{line.strip()[:60]}`",
+            f"in line {number} `{line.strip()[:60]}`",
             _EXPECTED,
             "The file is damaged or truncated: copy or export it again.",
         ) from error

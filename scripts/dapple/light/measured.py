@@ -21,7 +21,7 @@ def read(
     *,
     time_column: str = "time_utc",
     par_column: str = "par_umolm2s",
-    time_zone: str | None = None,
+    timezone: str | None = None,
     sensors: pd.DataFrame | None = None,
 ) -> pd.DataFrame:
     """Read PAR records from CSV.
@@ -33,7 +33,7 @@ def read(
         the label `logger_channel`.
     time_column, par_column : str
         Times (see `times.parse`) and photon flux [µmol m⁻² s⁻¹].
-    time_zone : str or None
+    timezone : str or None
         IANA zone of times without an offset; a column that ends in `_utc` needs none.
     sensors : pandas.DataFrame or None
         The sensor table, where every recorded sensor must be found.
@@ -66,7 +66,7 @@ def read(
     records = pd.DataFrame(
         {
             "sensor": label.str.strip(),
-            "time": parse(raw[time_column], path, time_zone),
+            "time": parse(raw[time_column], path, timezone),
             "par_umol_m2_s": pd.to_numeric(raw[par_column], errors="coerce"),
         }
     )

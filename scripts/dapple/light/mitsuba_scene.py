@@ -1,4 +1,4 @@
-"""Build Mitsuba's scene from ours: leaves, wood, turbid voxels, ground, a sky map and a sun disc.
+"""Build Mitsuba's scene from ours: leaves, wood, turbid voxels, ground, a sky map and a sun.
 
 Mitsuba's three colour channels serve as three spectral bands. Everything stays in the local
 frame (x east, y north, z up); only the sky map has axes of its own, turned here.
@@ -6,6 +6,7 @@ frame (x east, y north, z up); only the sky map has axes of its own, turned here
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from types import ModuleType
 from typing import Any
 
@@ -17,16 +18,13 @@ from dapple.formats.meshes import Mesh
 from dapple.light.mitsuba_plugins import register
 from dapple.light.scene import MESH_KINDS, Optics, Scene, TurbidGrid, turbid_grid
 
-SUN_DISTANCE_M = 1e5
-"""Far enough that 10 m between sensors turn the sun by 0.006 degrees only."""
-
 SPHERICAL_G = 0.5
 """Projection of a unit of leaf area with spherical angles, in any direction (Ross 1981)."""
 
 
 @dataclass
 class RenderScene:
-    """A Mitsuba scene whose sun and sky can be set, at the cost of one rebuild of the BVH.
+    """A Mitsuba scene whose sun and sky can be set without rebuilding it.
 
     Attributes
     ----------
@@ -36,10 +34,10 @@ class RenderScene:
     n_bands : int
         Bands in use, 1 to 3; the remaining channels repeat the last one.
     ground_z_m : float
-    centre_m : (3,) float64
-        The point that the sun disc faces.
+    variant : str
+        Of Mitsuba.
     sun_radius_rad : float
-        Half the angular diameter of the disc.
+        Half the angular diameter of the sun's disc.
     sky_shape : (rows, columns)
         Of the sky map.
     medium : mitsuba.Medium or None
@@ -51,7 +49,7 @@ class RenderScene:
     scene: Any
     n_bands: int
     ground_z_m: float
-    centre_m: np.ndarray
+    variant: str
     sun_radius_rad: float
     sky_shape: tuple[int, int]
     medium: Any = None
@@ -59,20 +57,12 @@ class RenderScene:
 
     def __post_init__(self) -> None:
         self._parameters = self.mi.traverse(self.scene)
-        self._parameters.keep(
-            ["sun.to_world", "sun.emitter.radiance.value", "sky.data", "sky.scale"]
-        )
-        self._sun_direction: np.ndarray | None = None
+        self._parameters.keep(["sun.to_world", "sun.irradiance.value", "sky.data", "sky.scale"])
 
     @property
     def integrator(self) -> str:
         """The name of the Mitsuba integrator that the scene needs."""
         return "path" if self.medium is None else "volpath"
-
-    @property
-    def sun_disc_m(self) -> float:
-        """Radius of the disc that stands for the sun [m]."""
-        return SUN_DISTANCE_M * np.tan(self.sun_radius_rad)
 
     def in_medium(self, points_m: np.ndarray) -> np.ndarray:
         """(n,) whether points lie in the box that the turbid medium fills."""
@@ -82,16 +72,14 @@ class RenderScene:
         return ((points_m > low) & (points_m < high)).all(axis=1)
 
     def set_sun(self, direction: np.ndarray, beam_normal: np.ndarray) -> None:
-        """Place the disc towards `direction` (3,), with irradiance `beam_normal` (n_bands,)."""
-        radiance = channels(beam_normal, self.n_bands, fill=0.0)
-        radiance = radiance / (np.pi * np.sin(self.sun_radius_rad) ** 2)
-        self._parameters["sun.emitter.radiance.value"] = self.mi.Color3f(*radiance.tolist())
+        """Let parallel light come from `direction` (3,) with irradiance `beam_normal` (n_bands,).
+
+        Rays do not meet this sun: it only lights what scatters. Nothing needs rebuilding.
+        """
+        beam = channels(beam_normal, self.n_bands, fill=0.0)
+        self._parameters["sun.irradiance.value"] = self.mi.Color3f(*beam.tolist())
+        self._parameters["sun.to_world"] = self.mi.Transform4f(_looking(self.mi, -direction))
         self._parameters.update()
-        if self._sun_direction is None or not np.array_equal(direction, self._sun_direction):
-            to_world = _sun_transform(self.mi, direction, self.centre_m, self.sun_disc_m)
-            self._parameters["sun.to_world"] = self.mi.Transform4f(to_world)
-            self._parameters.update()
-            self._sun_direction = np.array(direction)
 
     def set_sky(
         self,
@@ -108,13 +96,22 @@ class RenderScene:
             Irradiance of the open sky on the level; the map is scaled to give it exactly.
         """
         light = channels(diffuse_horizontal, self.n_bands, fill=0.0)
-        dark = not light.any()
-        # a black map cannot be sampled: keep a bright one and scale it to nothing
-        sky = sky_map(relative_radiance, self.sky_shape)[:, :, None] * (1.0 if dark else light)
-        sky = np.broadcast_to(sky, (*self.sky_shape, 3))
-        sky = np.concatenate([sky, sky[:, :1]], axis=1)
-        self._parameters["sky.data"] = self.mi.TensorXf(sky.astype(np.float32))
-        self._parameters["sky.scale"] = self.mi.Float(0.0 if dark else 1.0)
+        if light.any():
+            self._fill_sky(sky_map(relative_radiance, self.sky_shape)[:, :, None] * light, 1.0)
+        else:
+            # a black map cannot be sampled: keep a bright one and scale it to nothing
+            self._fill_sky(np.ones((*self.sky_shape, 3)), 0.0)
+
+    def set_even_sky(self, radiance: np.ndarray) -> None:
+        """Give all directions, those below the horizon too, the same radiance (n_bands,)."""
+        light = channels(radiance, self.n_bands, fill=0.0)
+        self._fill_sky(np.broadcast_to(light, (*self.sky_shape, 3)), 1.0)
+
+    def _fill_sky(self, radiance: np.ndarray, scale: float) -> None:
+        # Mitsuba's map repeats its first column at the end
+        closed = np.concatenate([radiance, radiance[:, :1]], axis=1)
+        self._parameters["sky.data"] = self.mi.TensorXf(closed.astype(np.float32))
+        self._parameters["sky.scale"] = self.mi.Float(scale)
         self._parameters.update()
 
 
@@ -159,20 +156,21 @@ def sky_map(
     zenith_deg = np.minimum(np.degrees(zenith[up]), 89.99)
     radiance = np.zeros(shape)
     radiance[up] = relative_radiance(*np.meshgrid(zenith_deg, azimuth_deg, indexing="ij"))
-    weight = _row_weights(zenith) * (2.0 * np.pi / columns)
+    weight = _row_weights(rows) * (2.0 * np.pi / columns)
     return radiance / (radiance * weight[:, None]).sum()
 
 
-def _row_weights(zenith: np.ndarray) -> np.ndarray:
+@cache
+def _row_weights(rows: int) -> np.ndarray:
     """Integral of cos z sin z dz over the upper hemisphere with each row's interpolation weight."""
-    step = zenith[1] - zenith[0]
+    step = np.pi / (rows - 1)
     fine = (np.arange(200_000) + 0.5) * (0.5 * np.pi / 200_000)
     place = fine / step
     row = place.astype(np.int64)
     value = np.cos(fine) * np.sin(fine) * (0.5 * np.pi / len(fine))
     part = place - row
-    weight = np.bincount(row, value * (1.0 - part), len(zenith))
-    return weight + np.bincount(row + 1, value * part, len(zenith))
+    weight = np.bincount(row, value * (1.0 - part), rows)
+    return weight + np.bincount(row + 1, value * part, rows)
 
 
 def build(
@@ -194,7 +192,7 @@ def build(
     variant : str
         An rgb variant of Mitsuba.
     sun_diameter_deg : float
-        Angular diameter of the sun; 0.53 on average over a year.
+        Angular diameter of the sun's disc; 0.53 on average over a year [deg].
     sky_step_deg : float
         Resolution of the sky map; divides 90.
     ground_radius_m : float
@@ -213,17 +211,19 @@ def build(
     register()
     colour = _colours(mi, optics)
     grid = turbid_grid(scene.voxels)
-    centre = _centre(scene, grid)
-    sun_radius = np.radians(0.5 * sun_diameter_deg)
     rows = 2 * round(90.0 / sky_step_deg) + 1
     shape = (rows, 2 * (rows - 1))
     content = {
         "type": "scene",
-        "sun": _sun(mi, centre, SUN_DISTANCE_M * np.tan(sun_radius)),
+        "sun": {
+            "type": "directional",
+            "to_world": _looking(mi, np.array([0.0, 0.0, -1.0])),
+            "irradiance": {"type": "rgb", "value": [0.0, 0.0, 0.0]},
+        },
         "sky": _sky(mi, shape),
         "ground": {
             "type": "disk",
-            "to_world": _affine(mi, centre, ground_radius_m),
+            "to_world": _affine(mi, _below(scene, grid), ground_radius_m),
             "bsdf": {"type": "diffuse", "reflectance": colour["ground_reflectance"]},
         },
         **mesh_shapes(mi, scene.meshes, colour),
@@ -238,8 +238,8 @@ def build(
         scene=loaded,
         n_bands=len(optics),
         ground_z_m=scene.ground_z_m,
-        centre_m=centre,
-        sun_radius_rad=sun_radius,
+        variant=variant,
+        sun_radius_rad=np.radians(0.5 * sun_diameter_deg),
         sky_shape=shape,
         medium=inside[0] if inside else None,
         medium_box_m=box,
@@ -287,39 +287,27 @@ def _mesh(mi: ModuleType, name: str, mesh: Mesh, bsdf: Any) -> Any:
 
 def _colours(mi: ModuleType, optics: Optics) -> dict[str, dict]:
     """Optical properties as rgb dictionaries; values that are no share of light are errors."""
-    colours = {}
-    for name in (
-        "leaf_reflectance",
-        "leaf_transmittance",
-        "bark_reflectance",
-        "ground_reflectance",
-    ):
-        values = channels(getattr(optics, name), len(optics))
-        if not ((values >= 0.0) & (values <= 1.0)).all():
+    n = len(optics)
+    names = [name for name in Optics.__dataclass_fields__ if name != "wavelength_nm"]
+    values = {name: channels(getattr(optics, name), n) for name in names}
+    values["leaf_albedo"] = values["leaf_reflectance"] + values["leaf_transmittance"]
+    for name, share in values.items():
+        if share.min() < 0.0 or share.max() > 1.0 + 1e-6:
             raise InputError(
-                name, f"{values.min():.3g} to {values.max():.3g}", "0 to 1", "Check the spectra."
+                name, f"{share.min():.3g} to {share.max():.3g}", "0 to 1", "Check the spectra."
             )
-        colours[name] = {"type": "rgb", "value": values.tolist()}
-    total = channels(optics.leaf_reflectance, len(optics)) + channels(
-        optics.leaf_transmittance, len(optics)
-    )
-    if total.max() > 1.0 + 1e-6:
-        raise InputError(
-            "leaf_reflectance + leaf_transmittance",
-            f"{total.max():.3g}",
-            "at most 1",
-            "Check the spectra.",
-        )
-    colours["leaf_albedo"] = {"type": "rgb", "value": np.minimum(total, 1.0).tolist()}
-    return colours
+    return {
+        name: {"type": "rgb", "value": np.minimum(share, 1.0).tolist()}
+        for name, share in values.items()
+    }
 
 
 def _plain(mi: ModuleType, colour: dict) -> Any:
     return mi.ScalarColor3f(colour["value"])
 
 
-def _centre(scene: Scene, grid: TurbidGrid | None) -> np.ndarray:
-    """The middle of the plants on the level, at the height of the ground."""
+def _below(scene: Scene, grid: TurbidGrid | None) -> np.ndarray:
+    """The point of the ground below the middle of the plants."""
     corners = [mesh.vertices_m for mesh in scene.meshes.values() if len(mesh.faces)]
     if grid is not None:
         shape = np.array(grid.plant_area_density_m2_m3.shape)
@@ -337,21 +325,11 @@ def _affine(mi: ModuleType, shift_m: np.ndarray, scale: float | np.ndarray) -> A
     return transform.translate(np.asarray(shift_m).tolist()) @ transform.scale(scale)
 
 
-def _sun_transform(mi: ModuleType, direction: np.ndarray, centre: np.ndarray, radius: float) -> Any:
-    north_or_up = [0.0, 1.0, 0.0] if abs(direction[2]) > 0.7 else [0.0, 0.0, 1.0]
-    place = centre + SUN_DISTANCE_M * np.asarray(direction)
-    transform = mi.ScalarTransform4f()
-    looks = transform.look_at(origin=place.tolist(), target=centre.tolist(), up=north_or_up)
-    return looks @ transform.scale([float(radius), float(radius), 1.0])
-
-
-def _sun(mi: ModuleType, centre: np.ndarray, radius: float) -> dict:
-    return {
-        "type": "disk",
-        "to_world": _sun_transform(mi, np.array([0.0, 0.0, 1.0]), centre, radius),
-        "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.0, 0.0, 0.0]}},
-        "emitter": {"type": "area", "radiance": {"type": "rgb", "value": [0.0, 0.0, 0.0]}},
-    }
+def _looking(mi: ModuleType, way: np.ndarray) -> Any:
+    """Transform that turns Mitsuba's z axis to the unit vector `way`."""
+    aside = [0.0, 1.0, 0.0] if abs(way[2]) > 0.7 else [0.0, 0.0, 1.0]
+    target = np.asarray(way).tolist()
+    return mi.ScalarTransform4f().look_at(origin=[0.0, 0.0, 0.0], target=target, up=aside)
 
 
 def _sky(mi: ModuleType, shape: tuple[int, int]) -> dict:

@@ -15,6 +15,8 @@ from dapple.light.traced import TracedScene
 
 PLASTIC_STEPS = (3242174889, 2447445414)
 """2³² over the plastic number and over its square: steps of the R2 sequence (Roberts 2018)."""
+PATHS_PER_KERNEL = 1 << 22
+"""Bounds memory: a path takes about 150 bytes."""
 
 
 @dataclass(frozen=True)
@@ -29,23 +31,28 @@ class Paths:
         Unit vector in which it left: its light came from there.
     orders : (m, 4) uint8
         Leaf reflections, leaf transmissions, bark and ground reflections on its way.
-    n_cut : int
-        Paths given up because they met more than `max_orders` surfaces.
+    weight : (m,) int64
+        Paths that it stands for: a power of two, 1 without random termination.
+    cut : (n,) int64
+        For each point, paths that were given up at `max_orders`, by their weight.
     """
 
     start: np.ndarray
     direction: np.ndarray
     orders: np.ndarray
-    n_cut: int
+    weight: np.ndarray
+    cut: np.ndarray
 
 
 def trace(
     scene: TracedScene,
     points_m: np.ndarray,
-    n_paths: int,
+    n_paths: np.ndarray,
     *,
     max_orders: int,
     seed: int,
+    first: np.ndarray | int = 0,
+    halved_after: int | None = None,
     aperture_m: float = 0.0,
 ) -> Paths:
     """Trace paths backward from horizontal cosine sensors that look up.
@@ -56,104 +63,135 @@ def trace(
         What the paths can meet.
     points_m : (n, 3) float64
         Sensors in the local frame [m].
-    n_paths : int
+    n_paths : (n,) int64
         Paths from each point; their first directions follow a shifted R2 sequence.
     max_orders : int
-        A path that meets more surfaces is given up (and counted).
+        A path that meets more surfaces is given up (and counted as cut), at most 255.
     seed : int
-        Of the random numbers; the result does not depend on the number of threads.
+        Of the random numbers. A path depends on it, its point's index and its own number, not on
+        the number of threads nor on how many paths are traced.
+    first : (n,) int64
+        Number of each point's first path: to add to paths that were traced before.
+    halved_after : int or None
+        From this number of surfaces on every second path is ended and the other counts twice.
     aperture_m : float
         Diameter of the sensors' receiving discs [m].
 
     Returns
     -------
     Paths
-        In order of sensor and path.
+        In order of point and path.
     """
     mi = scene.mi
-    n = len(points_m)
-    index = dr.arange(mi.UInt32, n * n_paths)
-    start = index // n_paths
-    rng = mi.PCG32(initstate=mi.UInt64(seed), initseq=mi.UInt64(index))
-    first = mi.warp.square_to_cosine_hemisphere(_stratified(mi, start, index % n_paths, seed))
+    n_paths = np.broadcast_to(n_paths, len(points_m)).astype(np.int64)
+    first = np.broadcast_to(first, len(points_m)).astype(np.int64)
+    ends = np.cumsum(n_paths)
+    fixed = [
+        dr.opaque(mi.UInt32, seed),
+        dr.opaque(mi.UInt32, max_orders),
+        dr.opaque(mi.UInt32, max_orders + 1 if halved_after is None else halved_after),
+        dr.opaque(mi.Float, 0.5 * aperture_m),
+    ]
+    points = [mi.Float(points_m[:, k].astype(np.float32)) for k in range(3)]
+    every = np.repeat(np.arange(len(points_m)), n_paths)
+    parts = []
+    for low in range(0, len(every), PATHS_PER_KERNEL):
+        start = every[low : low + PATHS_PER_KERNEL]
+        number = low + np.arange(len(start)) - (ends - n_paths - first)[start]
+        parts.append(_trace_block(scene, points, start, number, *fixed))
+    start, direction, orders, weight, cut = (
+        np.concatenate([part[k] for part in parts]) for k in range(5)
+    )
+    lost = np.bincount(start[cut], weight[cut], len(points_m)).astype(np.int64)
+    left = ~cut
+    return Paths(start[left], direction[left], orders[left], weight[left], lost)
+
+
+def _trace_block(scene, points, start, number, seed, max_orders, halved_after, radius):
+    """Trace the paths of one kernel; those that were absorbed by chance are left out."""
+    mi = scene.mi
+    start, number = mi.UInt32(start.astype(np.uint32)), mi.UInt32(number.astype(np.uint32))
+    point, shift = mi.sample_tea_32(start, seed)
+    state, sequence = mi.sample_tea_32(point + number, shift)
+    rng = mi.PCG32(initstate=mi.UInt64(state), initseq=mi.UInt64(sequence))
+    first = mi.warp.square_to_cosine_hemisphere(_stratified(mi, point, shift, number))
     on_disc = mi.warp.square_to_uniform_disk(mi.Point2f(rng.next_float32(), rng.next_float32()))
-    centre = [dr.gather(mi.Float, mi.Float(points_m[:, k]), start) for k in range(3)]
-    radius = 0.5 * aperture_m
-    origin = mi.Point3f(centre[0] + radius * on_disc.x, centre[1] + radius * on_disc.y, centre[2])
-    direction, escaped, *orders = _follow(
-        mi, scene, origin, mi.Vector3f(first), rng, mi.Bool(True), mi.UInt32(max_orders)
+    centre = mi.Point3f(*(dr.gather(mi.Float, axis, start) for axis in points))
+    origin = centre + radius * mi.Vector3f(on_disc.x, on_disc.y, 0)
+    direction, escaped, alive, weight, *orders = _follow(
+        mi, scene, origin, mi.Vector3f(first), rng, mi.Bool(True), max_orders, halved_after
     )
-    kept = dr.compress(escaped)
+    kept = dr.compress(escaped | alive)
+    packed = orders[0] | orders[1] << 8 | orders[2] << 16 | orders[3] << 24
+    columns = [dr.gather(mi.UInt32, column, kept) for column in (start, packed, weight)]
     direction = dr.gather(mi.Vector3f, direction, kept)
-    start = dr.gather(mi.UInt32, start, kept)
-    orders = [dr.gather(mi.UInt32, order, kept) for order in orders]
-    return Paths(
-        start=np.array(start).astype(np.int32),
-        direction=np.array(direction).T.astype(np.float32),
-        orders=np.stack([np.array(order) for order in orders], axis=1).astype(np.uint8),
-        n_cut=n * n_paths - len(kept),
+    escaped = dr.gather(mi.Bool, escaped, kept)
+    dr.eval(columns, direction, escaped)
+    start, packed, weight = (np.array(column) for column in columns)
+    return (
+        start.astype(np.int32),
+        np.ascontiguousarray(np.array(direction).T, np.float32),
+        packed[:, None].astype("<u4").view(np.uint8).reshape(-1, 4),
+        weight.astype(np.int64),
+        ~np.array(escaped),
     )
 
 
-def _stratified(mi, start, path, seed):
+def _stratified(mi, first_shift, second_shift, path):
     """Points of the R2 sequence, shifted at random for each sensor."""
-    shift = mi.PCG32(initstate=mi.UInt64(seed) + 1, initseq=mi.UInt64(start))
-    scale = 2.0**-32
+    shifts = (first_shift, second_shift)
     u, v = (
-        mi.Float(shift.next_uint32() + path * mi.UInt32(step)) * scale for step in PLASTIC_STEPS
+        mi.Float(shift + path * mi.UInt32(step)) * 2.0**-32
+        for shift, step in zip(shifts, PLASTIC_STEPS, strict=True)
     )
     # The conversion to float32 may round up to 1, which is outside the square.
     return mi.Point2f(dr.minimum(u, dr.one_minus_epsilon(mi.Float)), v)
 
 
+def scatter(mi, scene, point, normal, leaf, voxel, rng):
+    """Draw where light goes on: reflected, or transmitted with an even chance by leaves.
+
+    Returns
+    -------
+    origin, direction : Point3f, Vector3f
+        The next ray; surfaces push it off themselves, a point in a turbid voxel has no surface.
+    transmitted : Bool
+    """
+    square = mi.Point2f(rng.next_float32(), rng.next_float32())
+    transmitted = leaf & (rng.next_float32() < 0.5)
+    side = dr.select(transmitted, -normal, normal)
+    direction = mi.Frame3f(side).to_world(mi.warp.square_to_cosine_hemisphere(square))
+    push = dr.select(voxel, 0.0, scene.ray_offset)
+    return point + side * push, direction, transmitted
+
+
 @dr.syntax
-def _follow(mi, scene, origin, direction, rng, active, max_orders):
+def _follow(mi, scene, origin, direction, rng, active, max_orders, halved_after):
     """Follow paths until they leave the scene; return last directions and what they met."""
     a, b, c, d = mi.UInt32(0), mi.UInt32(0), mi.UInt32(0), mi.UInt32(0)
-    met = mi.UInt32(0)
-    escaped = mi.Bool(False)
+    met, weight = mi.UInt32(0), mi.UInt32(1)
+    escaped, cut = mi.Bool(False), mi.Bool(False)
     while active:
-        ray = mi.Ray3f(origin, direction)
-        found = scene.meshes.ray_intersect_preliminary(ray, coherent=False, active=active)
-        to_ground = dr.select(
-            direction.z < 0, (scene.ground_z_m - origin.z) / direction.z, mi.Float(dr.inf)
+        point, normal, leaf, voxel, bark, ground, crossed = scene.segment(
+            origin, direction, rng, active
         )
-        on_ground = to_ground < found.t
-        distance = dr.minimum(found.t, to_ground)
-        in_voxel = mi.Bool(False)
-        if dr.hint(scene.grid is not None, mode="scalar"):
-            optical_depth = -dr.log(1 - rng.next_float32())
-            free = scene.grid.free_path(origin, direction, distance, optical_depth, active)
-            in_voxel = free < distance
-            distance = dr.minimum(free, distance)
-        on_ground &= ~in_voxel
-        leaves_scene = active & (distance == dr.inf)
-        escaped |= leaves_scene
-        active &= ~leaves_scene
-
-        on_mesh = active & ~on_ground & ~in_voxel
-        surface = found.compute_surface_interaction(ray, mi.RayFlags.Minimal, on_mesh)
-        normal = mi.Normal3f(0, 0, 1)
-        normal[on_mesh] = surface.n
-        if dr.hint(scene.grid is not None, mode="scalar"):
-            drawn = scene.grid.leaf_normal(direction, rng, active & in_voxel)
-            normal[in_voxel] = drawn
-        normal = dr.select(dr.dot(normal, direction) > 0, -normal, normal)
-
-        u, v, choice = rng.next_float32(), rng.next_float32(), rng.next_float32()
-        leaf = in_voxel | (on_mesh & (surface.shape == scene.leaf))
-        transmitted = leaf & (choice < 0.5)
-        reflected = leaf & ~transmitted
-        side = dr.select(transmitted, -normal, normal)
-        scattered = mi.Frame3f(side).to_world(mi.warp.square_to_cosine_hemisphere(mi.Point2f(u, v)))
-        # Surfaces push the next ray off themselves; a point in a turbid voxel has no surface.
-        push = dr.select(in_voxel, 0.0, scene.ray_offset_m)
-        origin[active] = origin + direction * distance + side * push
-        direction[active] = scattered
-        a += dr.select(active & reflected, 1, 0)
-        b += dr.select(active & transmitted, 1, 0)
-        c += dr.select(on_mesh & ~leaf, 1, 0)
-        d += dr.select(active & on_ground, 1, 0)
-        met += 1
-        active &= met <= max_orders
-    return direction, escaped, a, b, c, d
+        event = active & (leaf | bark | ground)
+        escaped |= active & ~event & ~crossed
+        new_origin, new_direction, transmitted = scatter(mi, scene, point, normal, leaf, voxel, rng)
+        a += dr.select(event & leaf & ~transmitted, 1, 0)
+        b += dr.select(event & transmitted, 1, 0)
+        c += dr.select(event & bark, 1, 0)
+        d += dr.select(event & ground, 1, 0)
+        met += dr.select(event, 1, 0)
+        origin[event] = new_origin
+        direction[event] = new_direction
+        origin[active & crossed] = point
+        active &= event | crossed
+        cut |= active & (met > max_orders)
+        active &= ~cut
+        # Weights stay powers of two, so that sums of them stay integers.
+        thinned = active & event & (met >= halved_after)
+        dies = thinned & (rng.next_float32() < 0.5)
+        weight[thinned] = weight * 2
+        active &= ~dies
+    return direction, escaped, cut, weight, a, b, c, d

@@ -30,6 +30,16 @@ class Scene:
     voxels: xr.Dataset | None = None
     ground_z_m: float = 0.0
 
+    @property
+    def bounds_m(self) -> np.ndarray:
+        """(2, 3) lowest and highest coordinates of meshes and filled voxels [m]."""
+        corners = [mesh.vertices_m for mesh in self.meshes.values() if len(mesh.vertices_m)]
+        if (grid := turbid_grid(self.voxels)) is not None:
+            size = np.array(grid.plant_area_density_m2_m3.shape) * grid.voxel_size_m
+            corners.append(np.array([grid.low_m, grid.low_m + size]))
+        points = np.concatenate(corners)
+        return np.array([points.min(axis=0), points.max(axis=0)])
+
 
 @dataclass(frozen=True)
 class Optics:

@@ -21,111 +21,20 @@ RAYS_PER_KERNEL = 4_000_000
 BLACK = {"type": "rgb", "value": [0.0, 0.0, 0.0]}
 
 
-def sun_visibility(
-    scene: Scene,
-    points_m: np.ndarray,
-    sun_directions: np.ndarray,
-    *,
-    n_disc: int,
-    seed: int,
-    angular_diameter_deg: float = 0.53,
-    aperture_m: float = 0.0,
-    variant: str = "llvm_ad_rgb",
-) -> np.ndarray:
-    """Share of the sun's disc that each point sees in each direction of the sun.
+class Tracer:
+    """Shadow rays through one scene, whose acceleration structure is built once.
 
     Parameters
     ----------
     scene : Scene
-        The ground does not matter.
-    points_m : (n, 3) array
-        Local frame [m].
-    sun_directions : (m, 3) array
-        Unit vectors towards the middle of the sun; below the horizon nothing is seen.
-    n_disc : int
-        Rays per point and direction, evenly spread over the disc.
-    seed : int
-        Turns the pattern differently for each point and direction.
-    angular_diameter_deg : float
-        Of the sun [deg].
-    aperture_m : float
-        Diameter of the level entrance around each point [m]; 0 is a point.
-
-    Returns
-    -------
-    (n, m) float32
-        0 (shade) to 1 (full sun); with turbid voxels the mean transmittance.
+        Meshes and turbid voxels; the ground does not matter.
+    variant : str
+        Of Mitsuba.
     """
-    mi = engine.load(variant)
-    tracer = _Tracer(mi, scene)
-    points = mi.Point3f(np.ascontiguousarray(points_m, dtype=np.float32).T)
-    pattern = mi.Float(patterns.kronecker(n_disc, 4).astype(np.float32).ravel())
-    middle = np.asarray(sun_directions, dtype=np.float64)
-    axes = [mi.Vector3f(part.T.astype(np.float32)) for part in _frames(middle)]
-    radius = float(np.sin(np.radians(0.5 * angular_diameter_deg)))
-    n_points, n_suns = len(points_m), len(middle)
-    visible = np.empty(n_points * n_suns, dtype=np.float32)
-    suns = dr.opaque(mi.UInt32, n_suns)
-    fixed = (dr.opaque(mi.Float, radius), dr.opaque(mi.Float, 0.5 * aperture_m))
-    for low, high in _blocks(n_points * n_suns, n_disc):
-        ray, pair = _rays_of_block(mi, low, high - low, n_disc)
-        u = _shifted(mi, pattern, ray, n_disc, pair, seed)
-        point, sun = pair // suns, pair % suns
-        across, along, axis = (dr.gather(mi.Vector3f, part, sun) for part in axes)
-        x, y = _disc(mi, u[0], u[1])
-        way = dr.normalize(axis + fixed[0] * (x * across + y * along))
-        x, y = _disc(mi, u[2], u[3])
-        start = dr.gather(mi.Point3f, points, point) + fixed[1] * mi.Vector3f(x, y, 0.0)
-        seen = tracer.transmittance(start, way, way.z > 0.0)
-        visible[low:high] = np.array(dr.block_sum(seen, n_disc)) / n_disc
-    return visible.reshape(n_points, n_suns)
 
-
-def sky_visibility(
-    scene: Scene,
-    points_m: np.ndarray,
-    *,
-    n: int,
-    seed: int,
-    variant: str = "llvm_ad_rgb",
-) -> np.ndarray:
-    """Cosine-weighted share of the sky that each point sees: diffuse light below over above.
-
-    Parameters
-    ----------
-    scene : Scene
-    points_m : (p, 3) array
-        Local frame [m].
-    n : int
-        Rays per point, with a cosine law about the zenith.
-    seed : int
-
-    Returns
-    -------
-    (p,) float32
-        1 in the open.
-    """
-    mi = engine.load(variant)
-    tracer = _Tracer(mi, scene)
-    points = mi.Point3f(np.ascontiguousarray(points_m, dtype=np.float32).T)
-    pattern = mi.Float(patterns.kronecker(n, 4).astype(np.float32).ravel())
-    visible = np.empty(len(points_m), dtype=np.float32)
-    for low, high in _blocks(len(points_m), n):
-        ray, point = _rays_of_block(mi, low, high - low, n)
-        u = _shifted(mi, pattern, ray, n, point, seed)
-        x, y = _disc(mi, u[0], u[1])
-        way = mi.Vector3f(x, y, dr.sqrt(dr.maximum(1.0 - x * x - y * y, 0.0)))
-        start = dr.gather(mi.Point3f, points, point)
-        seen = tracer.transmittance(start, way, way.z > 0.0)
-        visible[low:high] = np.array(dr.block_sum(seen, n)) / n
-    return visible
-
-
-class _Tracer:
-    """Shadow rays through meshes and voxels."""
-
-    def __init__(self, mi: ModuleType, scene: Scene):
-        self.mi = mi
+    def __init__(self, scene: Scene, variant: str = "llvm_ad_rgb"):
+        self.variant = variant
+        self.mi = mi = engine.load(variant)
         register()
         names = ("leaf_reflectance", "leaf_transmittance", "bark_reflectance")
         shapes = mesh_shapes(mi, scene.meshes, dict.fromkeys(names, BLACK))
@@ -138,6 +47,92 @@ class _Tracer:
             self.low = mi.Point3f(*(dr.opaque(mi.Float, float(v)) for v in grid.low_m))
             self.size = dr.opaque(mi.Float, grid.voxel_size_m)
             self.grid = mi.Float((SPHERICAL_G * density).astype(np.float32).ravel())
+
+    def sun_visibility(
+        self,
+        points_m: np.ndarray,
+        sun_directions: np.ndarray,
+        *,
+        n_disc: int,
+        seed: int,
+        angular_diameter_deg: float = 0.53,
+        aperture_m: float = 0.0,
+    ) -> np.ndarray:
+        """Share of the sun's disc that each point sees in each direction of the sun.
+
+        Parameters
+        ----------
+        points_m : (n, 3) array
+            Local frame [m].
+        sun_directions : (m, 3) array
+            Unit vectors towards the middle of the sun; below the horizon nothing is seen.
+        n_disc : int
+            Rays per point and direction, evenly spread over the disc.
+        seed : int
+            Turns the pattern differently for each point and direction.
+        angular_diameter_deg : float
+            Of the sun [deg].
+        aperture_m : float
+            Diameter of the level entrance around each point [m]; 0 is a point.
+
+        Returns
+        -------
+        (n, m) float32
+            0 (shade) to 1 (full sun); with turbid voxels the mean transmittance.
+        """
+        mi = engine.load(self.variant)
+        points = _vectors(mi.Point3f, points_m)
+        pattern = mi.Float(patterns.kronecker(n_disc, 4).astype(np.float32).ravel())
+        across, along, axis = (
+            _vectors(mi.Vector3f, part) for part in _frames(np.asarray(sun_directions, float))
+        )
+        radius = dr.opaque(mi.Float, float(np.sin(np.radians(0.5 * angular_diameter_deg))))
+        entrance = dr.opaque(mi.Float, 0.5 * aperture_m)
+        n_points, n_suns = len(points_m), len(sun_directions)
+        suns = dr.opaque(mi.UInt32, n_suns)
+        visible = np.empty(n_points * n_suns, dtype=np.float32)
+        for low, high in _blocks(n_points * n_suns, n_disc):
+            ray, pair = _rays_of_block(mi, low, high - low, n_disc)
+            u = _shifted(mi, pattern, ray, pair, seed)
+            point, sun = pair // suns, pair % suns
+            x, y = _disc(u[0], u[1])
+            way = dr.gather(mi.Vector3f, across, sun) * x + dr.gather(mi.Vector3f, along, sun) * y
+            way = dr.normalize(dr.gather(mi.Vector3f, axis, sun) + radius * way)
+            x, y = _disc(u[2], u[3])
+            start = dr.gather(mi.Point3f, points, point) + entrance * mi.Vector3f(x, y, 0.0)
+            seen = self.transmittance(start, way, way.z > 0.0)
+            visible[low:high] = np.array(dr.block_sum(seen, n_disc)) / n_disc
+        return visible.reshape(n_points, n_suns)
+
+    def sky_visibility(self, points_m: np.ndarray, *, n: int, seed: int) -> np.ndarray:
+        """Cosine-weighted share of the sky that each point sees: diffuse light below over above.
+
+        Parameters
+        ----------
+        points_m : (p, 3) array
+            Local frame [m].
+        n : int
+            Rays per point, with a cosine law about the zenith.
+        seed : int
+
+        Returns
+        -------
+        (p,) float32
+            1 in the open.
+        """
+        mi = engine.load(self.variant)
+        points = _vectors(mi.Point3f, points_m)
+        pattern = mi.Float(patterns.kronecker(n, 4).astype(np.float32).ravel())
+        visible = np.empty(len(points_m), dtype=np.float32)
+        for low, high in _blocks(len(points_m), n):
+            ray, point = _rays_of_block(mi, low, high - low, n)
+            u = _shifted(mi, pattern, ray, point, seed)
+            x, y = _disc(u[0], u[1])
+            way = mi.Vector3f(x, y, dr.sqrt(dr.maximum(1.0 - x * x - y * y, 0.0)))
+            start = dr.gather(mi.Point3f, points, point)
+            seen = self.transmittance(start, way, way.z > 0.0)
+            visible[low:high] = np.array(dr.block_sum(seen, n)) / n
+        return visible
 
     def transmittance(self, start, way, active):
         """Share of light that a ray lets through; 0 where it is not active."""
@@ -187,6 +182,40 @@ def _march(mi: ModuleType, grid, shape: tuple[int, int, int], start, way, active
     return dr.while_loop(state, more, step)[1]
 
 
+def sun_visibility(
+    scene: Scene,
+    points_m: np.ndarray,
+    sun_directions: np.ndarray,
+    *,
+    n_disc: int,
+    seed: int,
+    angular_diameter_deg: float = 0.53,
+    aperture_m: float = 0.0,
+    variant: str = "llvm_ad_rgb",
+) -> np.ndarray:
+    """`Tracer.sun_visibility` for one call."""
+    return Tracer(scene, variant).sun_visibility(
+        points_m,
+        sun_directions,
+        n_disc=n_disc,
+        seed=seed,
+        angular_diameter_deg=angular_diameter_deg,
+        aperture_m=aperture_m,
+    )
+
+
+def sky_visibility(
+    scene: Scene, points_m: np.ndarray, *, n: int, seed: int, variant: str = "llvm_ad_rgb"
+) -> np.ndarray:
+    """`Tracer.sky_visibility` for one call."""
+    return Tracer(scene, variant).sky_visibility(points_m, n=n, seed=seed)
+
+
+def _vectors(kind, values: np.ndarray):
+    """(n, 3) numbers as Dr.Jit points or vectors."""
+    return kind(np.ascontiguousarray(np.asarray(values).T, dtype=np.float32))
+
+
 def _blocks(n_items: int, rays_per_item: int):
     """Ranges of items whose rays fit one kernel."""
     step = max(1, RAYS_PER_KERNEL // rays_per_item)
@@ -200,7 +229,7 @@ def _rays_of_block(mi: ModuleType, low: int, n_items: int, per_item: int):
     return index % per_item, index // per_item + dr.opaque(mi.UInt32, low)
 
 
-def _shifted(mi: ModuleType, pattern, ray, n: int, item, seed: int) -> list:
+def _shifted(mi: ModuleType, pattern, ray, item, seed: int) -> list:
     """Pattern points with a shift that belongs to the item, whatever the block it falls in."""
     first, second = mi.sample_tea_32(item, dr.opaque(mi.UInt32, seed))
     third, fourth = mi.sample_tea_32(first, second)
@@ -209,7 +238,7 @@ def _shifted(mi: ModuleType, pattern, ray, n: int, item, seed: int) -> list:
     return [point - dr.floor(point) for point in points]
 
 
-def _disc(mi: ModuleType, u, v):
+def _disc(u, v):
     """Even points of the disc of radius 1."""
     sine, cosine = dr.sincos(dr.two_pi * v)
     radius = dr.sqrt(u)

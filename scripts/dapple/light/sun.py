@@ -139,7 +139,7 @@ def read_radiation(
     time_column: str = "time_utc",
     global_column: str = "global_W_m2",
     diffuse_column: str = "diffuse_W_m2",
-    time_zone: str | None = None,
+    timezone: str | None = None,
 ) -> pd.DataFrame:
     """Read measured broadband radiation from CSV.
 
@@ -148,7 +148,7 @@ def read_radiation(
     path : path
     time_column, global_column, diffuse_column : str
         Times (see `times.parse`); global and diffuse irradiance on the horizontal [W m⁻²].
-    time_zone : str or None
+    timezone : str or None
         IANA zone of times without an offset; a column that ends in `_utc` needs none.
 
     Returns
@@ -174,7 +174,7 @@ def read_radiation(
             "Name the columns in the configuration.",
         )
     table = raw[columns[1:]].set_axis(["global_w_m2", "diffuse_w_m2"], axis="columns")
-    table.index = parse(raw[time_column], path, time_zone)
+    table.index = parse(raw[time_column], path, timezone)
     table = table.sort_index()
     _check_radiation(table, path)
     table = table.clip(lower=0.0)
@@ -259,7 +259,7 @@ def radiation_from_table(
     time_column: str = "time_utc",
     global_column: str = "global_W_m2",
     diffuse_column: str = "diffuse_W_m2",
-    time_zone: str | None = None,
+    timezone: str | None = None,
     linke_turbidity: float | None = 3.0,
     max_gap_min: float = 60.0,
 ) -> pd.DataFrame:
@@ -269,7 +269,7 @@ def radiation_from_table(
         time_column=time_column,
         global_column=global_column,
         diffuse_column=diffuse_column,
-        time_zone=time_zone,
+        timezone=timezone,
     )
     return radiation_at(
         table, times, site, linke_turbidity=linke_turbidity, max_gap_min=max_gap_min
@@ -345,3 +345,33 @@ def _check_radiation(table: pd.DataFrame, path: Path) -> None:
                 f"{MIN_IRRADIANCE_W_M2:g} to {MAX_IRRADIANCE_W_M2:g} W m⁻²",
                 "Remove the row: the gap is interpolated.",
             )
+
+
+def broadband(
+    times: pd.DatetimeIndex,
+    site: Site,
+    *,
+    kind: str,
+    path: str | Path | None = None,
+    linke_turbidity: float | None = 3.0,
+    **table,
+) -> pd.DataFrame:
+    """Global and diffuse radiation at the wanted times, modelled or from a file.
+
+    Parameters
+    ----------
+    times : (t,) DatetimeIndex
+        Time-zone aware.
+    site : Site
+    kind : {"clear_sky", "table"}
+        Where they come from.
+    path : path
+        The file, for "table".
+    linke_turbidity : float or None
+        See `clear_sky`.
+    **table
+        Columns, zone and largest gap of the file: see `radiation_from_table`.
+    """
+    if kind == "clear_sky":
+        return clear_sky(times, site, linke_turbidity=linke_turbidity)
+    return radiation_from_table(path, times, site, linke_turbidity=linke_turbidity, **table)

@@ -4,9 +4,11 @@ A sensor is a level plane that answers to the cosine. Its irradiance is an integ
 over the upper hemisphere; each radiance comes from Mitsuba's `path` or `volpath` integrator,
 asked along rays that start at the sensor:
 
-* direct: rays to points of the sun's disc, no scattering;
-* sky: rays with a cosine law, no scattering, the disc left out;
-* scattered: rays with a cosine law, light that comes straight from sun and sky left out.
+* direct: rays to points of the sun's disc, no scattering. While they are traced every direction
+  of the sky has the sun's radiance, so that a ray that gets out brings just that;
+* sky: rays with a cosine law, no scattering;
+* scattered: rays with a cosine law, light that comes straight from the sky left out. What
+  scatters is lit by the sky and by parallel light: penumbras do not change its mean.
 """
 
 from collections.abc import Callable
@@ -15,10 +17,11 @@ from functools import partial
 
 import numpy as np
 
+from dapple import engine
 from dapple.errors import InputError
 from dapple.frames import direction_from_angles
 from dapple.light import patterns
-from dapple.light.mitsuba_scene import SUN_DISTANCE_M, RenderScene
+from dapple.light.mitsuba_scene import RenderScene
 from dapple.light.sky import relative_radiance
 from dapple.streams import stream_seed
 
@@ -106,6 +109,8 @@ def timestep(
         A sensor lies below the ground.
     """
     beam, diffuse = (np.asarray(x, dtype=np.float64) for x in (beam_normal, diffuse_horizontal))
+    # plugins and types belong to a variant: another one may have been set since the scene was built
+    engine.load(scene.variant)
     sensors = _checked(np.asarray(sensors_m, dtype=np.float64), scene.ground_z_m)
     towards_sun = direction_from_angles(sun_zenith_deg, sun_azimuth_deg)
     if sun_zenith_deg >= 90.0:
@@ -113,14 +118,13 @@ def timestep(
     dark = np.zeros((len(sensors), effort.replicates, 3))
     parts = {"direct": dark, "sky": dark, "scattered": dark}
     if beam.any() or diffuse.any():
+        if beam.any():
+            scene.set_even_sky(beam / (np.pi * np.sin(scene.sun_radius_rad) ** 2))
+            parts["direct"] = _direct(scene, sensors, towards_sun, effort, aperture_m, seed)
         scene.set_sun(towards_sun, beam)
         scene.set_sky(_radiance_function(sky, sun_zenith_deg, sun_azimuth_deg), diffuse)
-        render = partial(_hemisphere, scene, sensors, towards_sun, effort, aperture_m, seed)
-        if beam.any():
-            parts["direct"] = _direct(scene, sensors, towards_sun, effort, aperture_m, seed)
-        if diffuse.any():
-            parts["sky"] = render("sky", effort.sky)
-        parts["scattered"] = render("scattered", effort.scattered)
+        for part in ("sky", "scattered") if diffuse.any() else ("scattered",):
+            parts[part] = _hemisphere(scene, sensors, part, effort, aperture_m, seed)
     return _summary(parts, scene.n_bands)
 
 
@@ -152,21 +156,16 @@ def _direct(
     aperture_m: float,
     seed: int,
 ) -> np.ndarray:
-    """(n, replicates, 3) irradiance by rays to points spread evenly over the sun's disc."""
+    """(n, replicates, 3) irradiance by rays to points of the sun's disc."""
     seed = stream_seed(seed, "direct")
-    copies = (len(sensors), effort.replicates)
-    square = patterns.shifted(effort.direct, 4, copies, seed)
+    square = patterns.shifted(effort.direct, 4, (len(sensors), effort.replicates), seed)
     start = _starts(sensors, square[..., 2:], aperture_m)
-    across = _across(towards_sun)
-    radius = scene.sun_disc_m
-    goal = scene.centre_m + SUN_DISTANCE_M * towards_sun
-    goal = goal + radius * patterns.disc(square[..., :2]) @ across
-    way = goal - start
-    distance = np.linalg.norm(way, axis=-1, keepdims=True)
-    way /= distance
-    # area of the disc, seen under its slant, over distance squared: the solid angle of a sample
-    solid_angle = np.pi * radius**2 * (way @ towards_sun)[..., None] / distance**2
-    weight = solid_angle * np.maximum(way[..., 2:], 0.0)
+    # even in the disc as it is seen from below: the cosine with its axis weighs solid angle
+    sine = np.sin(scene.sun_radius_rad)
+    flat = sine * patterns.disc(square[..., :2])
+    axial = np.sqrt(1.0 - (flat**2).sum(axis=-1, keepdims=True))
+    way = flat @ _across(towards_sun) + axial * towards_sun
+    weight = np.pi * sine**2 / axial * np.maximum(way[..., 2:], 0.0)
     integrator = {"type": scene.integrator, "max_depth": 1}
     radiance = _radiance(scene, integrator, start, way, way[..., 2] > 0.0, seed)
     return (radiance * weight).mean(axis=2)
@@ -175,32 +174,26 @@ def _direct(
 def _hemisphere(
     scene: RenderScene,
     sensors: np.ndarray,
-    towards_sun: np.ndarray,
+    part: str,
     effort: Effort,
     aperture_m: float,
     seed: int,
-    part: str,
-    n_rays: int,
 ) -> np.ndarray:
     """(n, replicates, 3) irradiance of the sky or of scattered light by rays with a cosine law."""
     seed = stream_seed(seed, part)
-    square = patterns.shifted(n_rays, 4, (len(sensors), effort.replicates), seed)
-    start = _starts(sensors, square[..., 2:], aperture_m)
-    way = patterns.cosine_hemisphere(square[..., :2])
-    if part == "sky":
-        integrator = {"type": scene.integrator, "max_depth": 1}
-        # the disc is direct light; a little more than its radius, for the parallax
-        seen = way @ towards_sun < np.cos(1.05 * scene.sun_radius_rad)
-    else:
-        integrator = {
-            "type": scene.integrator,
+    integrator = {"type": scene.integrator, "max_depth": 1}
+    if part == "scattered":
+        integrator |= {
             "max_depth": effort.max_depth,
             "rr_depth": effort.roulette_depth,
             "hide_emitters": True,
         }
-        seen = np.ones(way.shape[:-1], dtype=bool)
-    radiance = _radiance(scene, integrator, start, way, seen, seed)
-    return np.pi * radiance.mean(axis=2)
+    n_rays = effort.sky if part == "sky" else effort.scattered
+    square = patterns.shifted(n_rays, 4, (len(sensors), effort.replicates), seed)
+    start = _starts(sensors, square[..., 2:], aperture_m)
+    way = patterns.cosine_hemisphere(square[..., :2])
+    seen = np.ones(way.shape[:-1], dtype=bool)
+    return np.pi * _radiance(scene, integrator, start, way, seen, seed).mean(axis=2)
 
 
 def _radiance(

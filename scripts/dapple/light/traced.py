@@ -1,59 +1,266 @@
-"""A scene as the path kernel sees it: Mitsuba's meshes, an endless ground, turbid voxels."""
+"""A scene as rays see it: Mitsuba's meshes, an endless ground, turbid voxels."""
 
 from types import ModuleType
 
 import drjit as dr
 import numpy as np
-import xarray as xr
 
 from dapple import engine
+from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
-from dapple.light.scene import Scene
-from dapple.structure import leaf_angles
+from dapple.light import turbid
+from dapple.light.scene import MESH_KINDS, Scene
 
-N_ANGLES = 1024
-"""Entries of the tables of leaf angles."""
-MAX_DRAWS = 64
-"""Leaf normals that are drawn before the last is taken; one in two is accepted on average."""
+RAY_OFFSET = 1e-6
+"""How far a scattered ray starts from its surface, as a share of the scene's largest coordinate."""
+LEAST_EXTENT_M = 10.0
 
 
 class TracedScene:
-    """What backward paths can meet; no dataclass, since Dr.Jit would make loop state of it.
+    """What rays can meet; no dataclass, since Dr.Jit would make loop state of it.
 
     Attributes
     ----------
     mi : module
         Mitsuba, its variant set.
-    meshes : mitsuba.Scene
+    meshes : mitsuba.Scene or None
         Leaf and wood.
     leaf : mitsuba shape pointer
         Tells leaf from wood.
-    ground_z_m : float
-        Height of the ground, an endless plane [m].
-    grid : TurbidGrid or None
+    grid : TurbidVoxels or None
         Turbid voxels.
-    ray_offset_m : float
-        How far a scattered ray starts from its surface [m].
+    ground_z, top_z, ray_offset : Dr.Jit Float
+        Height of the ground, an endless plane, and of the highest plant; how far a scattered ray
+        starts from its surface [m].
+    cell : (low, high), Dr.Jit Point2f, or None
+        The ground plan that is repeated sideways without end.
     """
 
-    ray_offset_m = 1e-5
+    def __init__(self, mi: ModuleType, meshes, leaf, grid, box_m, ground_z_m: float, cell_m):
+        self.mi, self.meshes, self.leaf, self.grid = mi, meshes, leaf, grid
+        extent = max(LEAST_EXTENT_M, float(np.abs(box_m).max()))
+        # Opaque numbers stay out of the kernel's code: one kernel serves all scenes.
+        self.ground_z, self.top_z, self.ray_offset = (
+            dr.opaque(mi.Float, value) for value in (ground_z_m, box_m[1, 2], RAY_OFFSET * extent)
+        )
+        self.cell = None
+        if cell_m is not None:
+            self.cell = tuple(
+                mi.Point2f(*(dr.opaque(mi.Float, float(x)) for x in corner)) for corner in cell_m
+            )
 
-    def __init__(self, mi: ModuleType, meshes, leaf, ground_z_m: float, grid: "TurbidGrid | None"):
-        self.mi, self.meshes, self.leaf = mi, meshes, leaf
-        self.ground_z_m, self.grid = ground_z_m, grid
+    @dr.syntax
+    def segment(self, origin, direction, rng, active):
+        """Follow rays to whatever they meet first.
+
+        Returns
+        -------
+        point : Point3f
+            Where the ray meets something; for a repeated scene that may be the side of the cell,
+            and the point then lies on the side opposite.
+        normal : Normal3f
+            Of the leaf or surface, turned to where the ray comes from.
+        leaf, voxel, bark, ground, crossed : Bool
+            What it is (`voxel` is part of `leaf`); none of them where the ray leaves the scene.
+        """
+        mi = self.mi
+        ray = mi.Ray3f(origin, direction)
+        side = self._to_side(origin, direction)
+        ray.maxt = side
+        if dr.hint(self.meshes is not None, mode="scalar"):
+            found = self.meshes.ray_intersect_preliminary(ray, coherent=False, active=active)
+            to_mesh = dr.select(found.is_valid(), found.t, dr.inf)
+        else:
+            found = dr.zeros(mi.PreliminaryIntersection3f)
+            to_mesh = mi.Float(dr.inf)
+        to_ground = dr.select(
+            direction.z < 0, (self.ground_z - origin.z) / direction.z, mi.Float(dr.inf)
+        )
+        distance = dr.minimum(dr.minimum(to_mesh, to_ground), side)
+        voxel = mi.Bool(False)
+        if dr.hint(self.grid is not None, mode="scalar"):
+            limit = -dr.log(1 - rng.next_float32())
+            free = self.grid.march(origin, direction, distance, limit, active)[0]
+            voxel = active & (free < distance)
+            distance = dr.minimum(free, distance)
+        met = active & (distance < dr.inf)
+        mesh = met & ~voxel & (to_mesh <= distance)
+        ground = met & ~voxel & ~mesh & (to_ground <= distance)
+        crossed = met & ~voxel & ~mesh & ~ground
+
+        normal = mi.Normal3f(0, 0, 1)
+        leaf = mi.Bool(voxel)
+        if dr.hint(self.meshes is not None, mode="scalar"):
+            surface = found.compute_surface_interaction(ray, mi.RayFlags.Minimal, mesh)
+            normal[mesh] = surface.n
+            leaf |= mesh & (surface.shape == self.leaf)
+        if dr.hint(self.grid is not None, mode="scalar"):
+            drawn = self.grid.leaf_normal(direction, rng, voxel)
+            normal[voxel] = drawn
+        normal = dr.select(dr.dot(normal, direction) > 0, -normal, normal)
+        point = self._wrapped(origin + direction * distance, direction, crossed)
+        return point, normal, leaf, voxel, mesh & ~leaf, ground, crossed
+
+    @dr.syntax
+    def transmittance(self, origin, direction, active):
+        """Share of light that gets through along rays to the sky; 0 where they are not active."""
+        mi = self.mi
+        if dr.hint(self.cell is None, mode="scalar"):
+            if dr.hint(self.meshes is not None, mode="scalar"):
+                active &= ~self.meshes.ray_test(mi.Ray3f(origin, direction), active)
+            passed = mi.Float(1)
+            if dr.hint(self.grid is not None, mode="scalar"):
+                passed = self.grid.transmittance(origin, direction, mi.Float(dr.inf), active)
+        else:
+            passed = mi.Float(1)
+            start, going = mi.Point3f(origin), mi.Bool(active)
+            while going:
+                side = self._to_side(start, direction)
+                if dr.hint(self.meshes is not None, mode="scalar"):
+                    ray = mi.Ray3f(start, direction)
+                    ray.maxt = side
+                    active &= ~(going & self.meshes.ray_test(ray, going))
+                if dr.hint(self.grid is not None, mode="scalar"):
+                    passed *= self.grid.transmittance(start, direction, side, going & active)
+                going &= active & (side < dr.inf)
+                start = self._wrapped(start + direction * side, direction, going)
+        return dr.select(active, passed, 0)
+
+    def _to_side(self, origin, direction):
+        """Distance to the side of the cell; infinite where nothing but sky lies ahead."""
+        if self.cell is None:
+            return self.mi.Float(dr.inf)
+        low, high = self.cell
+        ends = [
+            dr.select(d > 0, (b - x) / d, dr.select(d < 0, (a - x) / d, dr.inf))
+            for a, b, x, d in (
+                (low.x, high.x, origin.x, direction.x),
+                (low.y, high.y, origin.y, direction.y),
+            )
+        ]
+        # A ray that starts on a side and leaves the cell has gone round it by rounding: it crosses.
+        side = dr.maximum(dr.minimum(*ends), 0)
+        return dr.select((direction.z > 0) & (origin.z > self.top_z), dr.inf, side)
+
+    def _wrapped(self, point, direction, crossed):
+        """Points on a side of the cell, put on the opposite side."""
+        if self.cell is None:
+            return point
+        low, high = self.cell
+        moved = self.mi.Point3f(point)
+        for axis in "xy":
+            a, b, x, d = (getattr(part, axis) for part in (low, high, point, direction))
+            margin = (b - a) * 1e-6
+            at_high = crossed & (d > 0) & (x >= b - margin)
+            at_low = crossed & (d < 0) & (x <= a + margin)
+            setattr(moved, axis, dr.select(at_high, a, dr.select(at_low, b, x)))
+        return moved
 
 
-def load(scene: Scene, variant: str = "llvm_ad_mono") -> TracedScene:
-    """Hand the meshes to Mitsuba and the voxels to Dr.Jit."""
+def load(
+    scene: Scene,
+    variant: str = "llvm_ad_mono",
+    *,
+    places_m: np.ndarray | None = None,
+    cell_m: np.ndarray | None = None,
+) -> TracedScene:
+    """Hand the meshes to Mitsuba and the voxels to Dr.Jit.
+
+    Parameters
+    ----------
+    scene : Scene
+        What stands on the ground.
+    variant : str
+        Mitsuba variant, `llvm_ad_*` or `cuda_ad_*`.
+    places_m : (k, 3) float64 or None
+        The meshes stand at these places, shifted from where they are, and are stored once [m].
+    cell_m : (2, 2) float64 or None
+        Low and high corner (x, y) of a ground plan that repeats sideways without end [m]. What
+        reaches beyond one side comes in at the other.
+
+    Raises
+    ------
+    InputError
+        An unknown kind of mesh, wrong voxels, or voxels wider than the cell.
+    """
+    if unknown := set(scene.meshes) - set(MESH_KINDS):
+        raise InputError(
+            "Scene.meshes",
+            f"the kind {sorted(unknown)[0]}",
+            f"one of {', '.join(MESH_KINDS)}",
+            "Give each mesh an optical kind.",
+        )
     mi = engine.load(variant)
-    shapes = {kind: _mitsuba_mesh(mi, kind, mesh) for kind, mesh in scene.meshes.items()}
-    loaded = mi.load_dict({"type": "scene", **shapes}, optimize=False)
-    leaf = mi.ShapePtr(shapes["leaf"]) if "leaf" in shapes else dr.zeros(mi.ShapePtr)
-    grid = TurbidGrid(mi, scene.voxels) if scene.voxels is not None else None
-    return TracedScene(mi, loaded, leaf, scene.ground_z_m, grid)
+    grid = turbid.load(mi, scene.voxels)
+    cell = None if cell_m is None else np.asarray(cell_m, np.float64)
+    _check_cell(grid, cell)
+    filled = {kind: mesh for kind, mesh in scene.meshes.items() if len(mesh.faces)}
+    shapes = {kind: _mitsuba_mesh(mi, kind, mesh) for kind, mesh in filled.items()}
+    boxes = [] if grid is None else [np.array([grid.low_m, grid.high_m])]
+    loaded, leaf = None, dr.zeros(mi.ShapePtr)
+    if shapes:
+        vertices = [mesh.vertices_m for mesh in filled.values()]
+        box = np.array(
+            [np.min([v.min(0) for v in vertices], 0), np.max([v.max(0) for v in vertices], 0)]
+        )
+        if places_m is None and cell is None:
+            content = shapes
+        else:
+            places = _with_copies(np.zeros((1, 3)) if places_m is None else places_m, box, cell)
+            content = _instances(mi, shapes, places)
+            box = box + np.array([places.min(axis=0), places.max(axis=0)])
+        boxes.append(box)
+        loaded = mi.load_dict({"type": "scene", **content}, optimize=False)
+        leaf = mi.ShapePtr(shapes["leaf"]) if "leaf" in shapes else leaf
+    boxes.append(np.full((2, 3), scene.ground_z_m))
+    box = np.array([np.min(boxes, axis=(0, 1)), np.max(boxes, axis=(0, 1))])
+    return TracedScene(mi, loaded, leaf, grid, box, scene.ground_z_m, cell)
 
 
-def _mitsuba_mesh(mi, name: str, mesh: Mesh):
+def _check_cell(grid, cell: np.ndarray | None) -> None:
+    if grid is None or cell is None:
+        return
+    tolerance = 1e-6 * np.abs(cell).max()
+    if (grid.low_m[:2] < cell[0] - tolerance).any() or (
+        grid.high_m[:2] > cell[1] + tolerance
+    ).any():
+        raise InputError(
+            "cell_m",
+            f"voxels from {grid.low_m[:2]} to {grid.high_m[:2]} m",
+            f"voxels within the cell from {cell[0]} to {cell[1]} m",
+            "Crop the voxels or widen the cell; only meshes are continued at the opposite side.",
+        )
+
+
+def _with_copies(places_m: np.ndarray, box_m: np.ndarray, cell_m: np.ndarray | None) -> np.ndarray:
+    """Places, and those of neighbouring cells from where meshes reach into the cell."""
+    places = np.asarray(places_m, np.float64)
+    if cell_m is None:
+        return places
+    size = cell_m[1] - cell_m[0]
+    reach = [int(np.ceil(np.ptp(box_m[:, k]) / size[k])) + 1 for k in range(2)]
+    shifts = [
+        (i * size[0], j * size[1], 0.0)
+        for i in range(-reach[0], reach[0] + 1)
+        for j in range(-reach[1], reach[1] + 1)
+    ]
+    every = (places[:, None] + np.array(shifts)).reshape(-1, 3)
+    low, high = every[:, :2] + box_m[0, :2], every[:, :2] + box_m[1, :2]
+    return every[((high > cell_m[0]) & (low < cell_m[1])).all(axis=1)]
+
+
+def _instances(mi: ModuleType, shapes: dict, places_m: np.ndarray) -> dict:
+    content = {"plant": {"type": "shapegroup", **shapes}}
+    for index, place in enumerate(places_m):
+        content[f"plant_{index}"] = {
+            "type": "instance",
+            "group": {"type": "ref", "id": "plant"},
+            "to_world": mi.ScalarTransform4f().translate(place.tolist()),
+        }
+    return content
+
+
+def _mitsuba_mesh(mi: ModuleType, name: str, mesh: Mesh):
     """A mesh without texture coordinates and vertex normals."""
     loaded = mi.Mesh(name, len(mesh.vertices_m), len(mesh.faces))
     parameters = mi.traverse(loaded)
@@ -61,92 +268,3 @@ def _mitsuba_mesh(mi, name: str, mesh: Mesh):
     parameters["faces"] = mesh.faces.astype(np.uint32).ravel()
     parameters.update()
     return loaded
-
-
-class TurbidGrid:
-    """Voxels filled with infinitely small leaves.
-
-    Attributes
-    ----------
-    corner_m, size_m, shape
-        Lower corner [m], edge [m], number of voxels in x, y, z.
-    density : (nx * ny * nz,) Dr.Jit Float
-        Plant area density [m² m⁻³], z fastest.
-    projection : (N_ANGLES,) Dr.Jit Float
-        G at equally spaced |cos| of the ray's zenith angle.
-    inclination_cos : (N_ANGLES,) Dr.Jit Float
-        Quantiles of the cosine of the leaves' inclination.
-    """
-
-    def __init__(self, mi: ModuleType, voxels: xr.Dataset):
-        """Take a voxel dataset; unknown voxels count as empty."""
-        density = np.nan_to_num(voxels["plant_area_density_m2_m3"].transpose("x", "y", "z").values)
-        distribution = voxels.attrs["leaf_angle_distribution"]
-        projection = leaf_angles.projection(distribution, np.arccos(np.linspace(0, 1, N_ANGLES)))
-        quantiles = leaf_angles.normal_cosine_quantiles(distribution, N_ANGLES)
-        self.mi = mi
-        self.size_m = float(voxels.attrs["voxel_size_m"])
-        self.corner_m = [float(voxels[axis][0]) - 0.5 * self.size_m for axis in "xyz"]
-        self.shape = density.shape
-        self.density = mi.Float(density.astype(np.float32).ravel())
-        self.projection = mi.Float(projection.astype(np.float32))
-        self.inclination_cos = mi.Float(quantiles.astype(np.float32))
-
-    def _lookup(self, table, share):
-        """A table over 0 to 1, linear between its entries."""
-        position = dr.clip(share, 0, 1) * (N_ANGLES - 1)
-        low = dr.minimum(self.mi.UInt32(position), N_ANGLES - 2)
-        left, right = (dr.gather(self.mi.Float, table, low + k) for k in (0, 1))
-        return dr.lerp(left, right, position - self.mi.Float(low))
-
-    @dr.syntax
-    def leaf_normal(self, direction, rng, active):
-        """Draw a leaf normal by its area projected on the ray: from the distribution, accepted
-        with the chance |cos| of its angle to the ray."""
-        mi = self.mi
-        normal = mi.Normal3f(0, 0, 1)
-        draws = mi.UInt32(0)
-        searching = mi.Bool(active)
-        while searching:
-            z = self._lookup(self.inclination_cos, rng.next_float32())
-            sine, cosine = dr.sincos(2 * dr.pi * rng.next_float32())
-            r = dr.safe_sqrt(1 - z * z)
-            normal[searching] = mi.Normal3f(r * cosine, r * sine, z)
-            draws += 1
-            accepted = rng.next_float32() < dr.abs(dr.dot(normal, direction))
-            searching &= ~accepted & (draws < MAX_DRAWS)
-        return normal
-
-    @dr.syntax
-    def free_path(self, origin, direction, end_m, optical_depth, active):
-        """Distance at which an optical depth is used up, infinite if that is beyond `end_m`."""
-        mi = self.mi
-        corner, shape = mi.Vector3f(self.corner_m), mi.Vector3f(self.shape)
-        # A zero component would make 0 * inf; a tiny one never reaches its plane.
-        d = dr.select(dr.abs(direction) < 1e-12, 1e-12, direction)
-        low = (corner - origin) / d
-        high = (corner + shape * self.size_m - origin) / d
-        t = dr.maximum(dr.max(dr.minimum(low, high)), 0)
-        last = dr.minimum(dr.min(dr.maximum(low, high)), end_m)
-        voxel = dr.clip(dr.floor((origin + d * t - corner) / self.size_m), 0, shape - 1)
-        forward = mi.Vector3f(dr.select(d > 0, 1, 0))
-        step = 2 * forward - 1
-        extinction = self._lookup(self.projection, dr.abs(direction.z))
-        found = mi.Float(dr.inf)
-        rest = mi.Float(optical_depth)
-        marching = active & (t < last)
-        while marching:
-            planes = (corner + (voxel + forward) * self.size_m - origin) / d
-            leave = dr.min(planes)
-            flat = mi.UInt32((voxel.x * self.shape[1] + voxel.y) * self.shape[2] + voxel.z)
-            sigma = extinction * dr.gather(mi.Float, self.density, flat, marching)
-            here = dr.maximum(dr.minimum(leave, last) - t, 0)
-            used_up = marching & (sigma * here >= rest) & (sigma > 0)
-            found[used_up] = t + rest / sigma
-            rest -= sigma * here
-            t = dr.maximum(leave, t)
-            across = mi.Vector3f(dr.select(planes == leave, 1, 0))
-            voxel += step * across
-            inside = dr.all((voxel >= 0) & (voxel < shape))
-            marching &= ~used_up & inside & (t < last)
-        return found

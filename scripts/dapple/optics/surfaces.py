@@ -67,7 +67,7 @@ def reflectance(
     ----------
     source : float, mapping or path
         One value for all bands; a table with the keys `wavelength_nm` and `reflectance`,
-        linear between its entries; or a CSV file (see `read`).
+        linear between its entries; or a CSV file (see `read`), also as the key `path`.
     wavelength_nm : (b,) float
         Band centres [nm].
     where : str
@@ -83,6 +83,8 @@ def reflectance(
     InputError
         Values outside 0 to 1, not numbers, or a table that does not cover the bands.
     """
+    if isinstance(source, Mapping) and source.get("path"):
+        source = source["path"]
     if isinstance(source, (str, Path)):
         table, where = read(source), f"{where} ({source})"
     elif isinstance(source, Mapping):

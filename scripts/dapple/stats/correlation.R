@@ -38,7 +38,15 @@ mixed_model <- function(records) {
     y = records$measured / unit_y,
     sensor = factor(records$sensor)
   )
-  model <- lme4::lmer(y ~ x + (1 | sensor), data = scaled, REML = TRUE)
+  notes <- character()
+  model <- withCallingHandlers(
+    lme4::lmer(y ~ x + (1 | sensor), data = scaled, REML = TRUE),
+    warning = function(w) {
+      notes <<- c(notes, conditionMessage(w))
+      invokeRestart("muffleWarning")
+    },
+    message = function(m) invokeRestart("muffleMessage") # singularity has a column of its own
+  )
   beta <- lme4::fixef(model)
   covariance <- as.matrix(vcov(model))
   # (intercept, slope) in the records' units is a linear map of the scaled pair.
@@ -53,7 +61,8 @@ mixed_model <- function(records) {
     sensor_sd = sqrt(spread[1]) * unit_y, residual_sd = sqrt(spread[2]) * unit_y,
     r2_marginal = explained / total, r2_conditional = (explained + spread[1]) / total,
     residual_autocorrelation = autocorrelation(residuals(model), scaled$sensor),
-    singular = lme4::isSingular(model)
+    singular = lme4::isSingular(model),
+    note = gsub("\\s+", " ", paste(notes, collapse = "; "))
   )
 }
 

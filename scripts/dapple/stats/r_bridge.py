@@ -87,6 +87,7 @@ def _start():
         ) from error
     callbacks.consolewrite_warnerror = lambda text: log.warning("R: %s", text.strip())
     callbacks.consolewrite_print = lambda text: log.info("R: %s", text.rstrip())
+    robjects.r("options(warn = 1)")  # at once: R would keep warnings back until some later call
     return robjects
 
 

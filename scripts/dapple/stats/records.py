@@ -76,3 +76,11 @@ def pair(
     columns = ["reconstruction", "sensor", "time", "measured", "simulated", "direct"]
     columns += ["baseline"] * (open_sky_umol_m2_s is not None)
     return records.sort_values(["sensor", "time"], ignore_index=True)[columns]
+
+
+def simulated(light: xr.Dataset, reconstruction: str) -> pd.DataFrame:
+    """Simulated light alone as a table of records, where nothing was measured."""
+    table = light["par_umol_m2_s"].to_dataframe("simulated").reset_index()
+    table["time"] = table["time"].astype("datetime64[ns]").dt.tz_localize("UTC")
+    table.insert(0, "reconstruction", reconstruction)
+    return table

@@ -3,6 +3,10 @@
 Attenuation k [m⁻¹] is PAD·G, and G may differ from shot to shot. So lengths are taken as optical
 paths u = G·length, and every estimator gives plant area density at once.
 
+Only the free path estimators stay right where wood stands in a voxel: they know how far each beam
+came. The others know of a hit the path through the whole voxel, not the wood that may have stood
+behind it, and come out too low.
+
 Two estimators need more than sums: an equation over the path lengths of all shots. It is
 solved from the moments of path length (`path_nodes`), which are sums again: a few path lengths
 with weights stand for all of them, exact for every polynomial below the number of moments.

@@ -80,7 +80,7 @@ def reconstruct(
     if not len(points_m):
         raise EmptyCloudError(
             "polygons",
-            f"no {what} points",
+            f"no {what} points in the cloud",
             "at least one",
             "Look at what the filters left, and check the reflectance threshold.",
         )

@@ -61,10 +61,21 @@ def _nearest(facet):
 
 
 @njit(cache=True)
-def _add_moments(row, at, weight, t):
-    for j in range(at, len(row)):
-        row[j] += weight
+def _add_moments(sums, voxel, at, weight, t):
+    for j in range(at, sums.shape[1]):
+        sums[voxel, j] += weight
         weight *= t
+
+
+@njit(cache=True)
+def _section(origin, corner, index, size, beam):
+    """Section of the beam at a voxel's centre [m²]; 1 for a unit beam."""
+    if beam[0] == 0.0 and beam[1] == 0.0:
+        return 1.0
+    distance = 0.0
+    for k in range(3):
+        distance += (corner[k] + (index[k] + 0.5) * size - origin[k]) ** 2
+    return math.pi * (beam[0] * math.sqrt(distance) + 0.5 * beam[1]) ** 2
 
 
 @njit(cache=True)
@@ -74,107 +85,128 @@ def _effective(length, lambda_1):
 
 
 @njit(cache=True)
-def _visit_parts(
-    origin, direction, corner, size, n_parts, enter, stop, echoes, kind, touched, hit, work
+def _start_parts(
+    origin, direction, corner, size, n, distance, inverse, index, part, fine, step, move
 ):
-    """Mark the parts (sub-voxels) of one voxel that a beam visits from `enter` to `stop`.
+    """Set up the march through parts (sub-voxels): `part` is the index along each axis."""
+    part_size = size / n
+    for k in range(3):
+        low = corner[k] + index[k] * size
+        place = int((origin[k] + direction[k] * distance - low) / part_size)
+        part[k] = min(max(place, 0), n - 1)
+        move[k] = (n * n, n, 1)[k]
+        fine[k] = step[k] = math.inf
+        if direction[k] != 0.0:
+            facet = low + (part[k] + (1 if direction[k] > 0.0 else 0)) * part_size
+            fine[k], step[k] = (facet - origin[k]) * inverse[k], abs(inverse[k]) * part_size
+            move[k] = move[k] if direction[k] > 0.0 else -move[k]
+    return (part[0] * n + part[1]) * n + part[2]
 
-    `corner` is the voxel's own. Returns how many parts were visited and the chords' sum.
+
+@njit(cache=True)
+def _visit_parts(
+    voxel, part, distance, leave, stop, near, fine, step, move, range_m, kind, first, last,
+    touched, hit,
+):  # fmt: skip
+    """Mark the parts of one voxel that a beam visits from `distance` to `stop` or `leave`.
+
+    Returns the part it is in at the end, how many it visited, and the sum of the chords in them.
     """
-    inverse, index, facet, shape = work
-    shape[:] = n_parts
-    part_size = size / n_parts
-    _start(origin, direction, corner, shape, part_size, enter, inverse, index, facet)
-    distance, visits, path, j, part = enter, 0, 0.0, 0, 0
+    tx, ty, tz = fine[0], fine[1], fine[2]
+    visits, enter, j = 0, distance, first
     while True:
-        k = _nearest(facet)
-        leave = facet[k]
-        if leave - distance > 1e-9 * size:
-            part = (index[0] * n_parts + index[1]) * n_parts + index[2]
-            touched[part] = 1
+        facet = min(tx, ty, tz, leave)
+        if facet - distance > near and 0 <= part < touched.shape[1]:
             visits += 1
-            path += leave - distance
-            while j < len(echoes) and echoes[j] < leave:
+            if touched[voxel, part] == 0:
+                touched[voxel, part] = 1
+            while j < last and (range_m[j] < facet or facet >= leave - near):
                 if kind[j] == HIT:
-                    hit[part] = 1
+                    hit[voxel, part] = 1
                 j += 1
-        distance = leave
-        index[k] += 1 if inverse[k] > 0.0 else -1
-        if distance >= stop or index[k] < 0 or index[k] >= n_parts:
-            for rest in range(j, len(echoes)):  # rounding may put them on the voxel's far facet
-                if kind[rest] == HIT:
-                    hit[part] = 1
-            return visits, path
-        facet[k] = _next_facet(origin, inverse, corner, part_size, index[k], k)
+            distance = facet
+        if facet >= leave - near or distance >= stop:
+            fine[0], fine[1], fine[2] = tx, ty, tz
+            return part, visits, distance - enter
+        # Which facet comes next is hard to foresee: choose without branches.
+        on_x = (tx <= ty) & (tx <= tz)
+        on_y = (not on_x) & (ty <= tz)
+        part += move[0] if on_x else (move[1] if on_y else move[2])
+        tx += step[0] if on_x else 0.0
+        ty += step[1] if on_y else 0.0
+        tz += 0.0 if on_x | on_y else step[2]
 
 
 @njit(cache=True)
 def _march(
-    origin, direction, zenith, g, echoes, kind, corner, shape, size, beam, lambda_1, u_max,
-    n_parts, visits, hits, touched, hit, work, part_work, part_corner,
+    i, origin, direction, zenith, g, first, range_m, kind, corner, shape, size, beam, lambda_1,
+    u_max, n_parts, visits, hits, touched, hit, inverse, facet, fine, step, index, place, move,
 ):  # fmt: skip
-    """Follow one shot until it leaves the grid or its last echo has taken the rest of the beam."""
-    inverse, index, facet = work
-    n, j = len(echoes), 0
-    share = 1.0 / n if n else 0.0
-    distance, far = _clip(origin, direction, corner, shape, size)
-    while j < n and echoes[j] < distance:
+    """Follow shot i until it leaves the grid or its last echo has taken the rest of the beam."""
+    o, d = origin[i], direction[i]
+    j, end = first[i], first[i + 1]
+    is_miss = j == end
+    share = 0.0 if is_miss else 1.0 / (end - j)
+    distance, far = _clip(o, d, corner, shape, size)
+    while j < end and range_m[j] < distance:
         j += 1
-    if not distance < far or (n > 0 and j == n):
+    if not distance < far or (j == end and not is_miss):
         return
-    _start(origin, direction, corner, shape, size, distance, inverse, index, facet)
+    _start(o, d, corner, shape, size, distance, inverse, index, facet)
+    part, near = 0, 1e-9 * size
+    if n_parts > 0:
+        part = _start_parts(
+            o, d, corner, size, n_parts, distance, inverse, index, place, fine, step, move
+        )
     while True:
         k = _nearest(facet)
         leave = facet[k]
-        chord = leave - distance
-        if chord > 1e-9 * size:  # a beam through an edge enters no voxel beside it
+        if leave - distance > near:  # a beam through an edge enters no voxel beside it
             voxel = (index[0] * shape[1] + index[1]) * shape[2] + index[2]
-            section = 1.0
-            if beam[0] > 0.0 or beam[1] > 0.0:
-                d2 = 0.0
-                for a in range(3):
-                    d2 += (corner[a] + (index[a] + 0.5) * size - origin[a]) ** 2
-                section = math.pi * (beam[0] * math.sqrt(d2) + 0.5 * beam[1]) ** 2
-            row, first = visits[voxel], j
-            entering = section * share * (n - j) if n else section
-            whole, t = entering, 2.0 * g * chord / u_max - 1.0
-            while j < n and echoes[j] < leave:
-                free = max(echoes[j] - distance, 0.0)
-                weight = section * share
+            chord, from_j = leave - distance, j
+            section = _section(o, corner, index, size, beam)
+            whole = section * (1.0 if is_miss else share * (end - j))
+            t = 2.0 * g * chord / u_max - 1.0
+            while j < end and range_m[j] < leave:
+                free, weight = max(range_m[j] - distance, 0.0), section * share
                 u = g * _effective(free, lambda_1)
-                row[FREE] += weight * u
+                visits[voxel, FREE] += weight * u
                 if kind[j] == HIT:
                     hits[voxel, N_HITS] += 1.0
                     hits[voxel, HIT_FREE] += weight * u
-                    _add_moments(hits[voxel], HIT_MOMENTS, weight, t)
+                    _add_moments(hits, voxel, HIT_MOMENTS, weight, t)
                 else:  # what stops it has seen no leaf so far
-                    _add_moments(row, VISIT_MOMENTS, weight, 2.0 * g * free / u_max - 1.0)
+                    at = 2.0 * g * free / u_max - 1.0
+                    _add_moments(visits, voxel, VISIT_MOMENTS, weight, at)
                     whole -= weight
                 j += 1
-            passing = section * share * (n - j) if n else section
-            row[N_SHOTS] += 1.0
-            row[PATH] += chord
-            row[ANGLE] += zenith
-            row[FREE] += passing * g * _effective(chord, lambda_1)
-            if whole > 1e-12 * entering:
-                _add_moments(row, VISIT_MOMENTS, whole, t)
+            is_over = j == end and not is_miss
+            visits[voxel, N_SHOTS] += 1.0
+            visits[voxel, PATH] += chord
+            visits[voxel, ANGLE] += zenith
+            if not is_over:
+                passing = section * (1.0 if is_miss else share * (end - j))
+                visits[voxel, FREE] += passing * g * _effective(chord, lambda_1)
+            if whole > 1e-12 * section:
+                _add_moments(visits, voxel, VISIT_MOMENTS, whole, t)
             if n_parts > 0:
-                for a in range(3):
-                    part_corner[a] = corner[a] + index[a] * size
-                stop = echoes[n - 1] if n > 0 and j == n else leave
-                number, path = _visit_parts(
-                    origin, direction, part_corner, size, n_parts, distance, stop,
-                    echoes[first:j], kind[first:j], touched[voxel], hit[voxel], part_work,
+                stop = range_m[end - 1] if is_over else leave
+                part, number, path = _visit_parts(
+                    voxel, part, distance, leave, stop, near, fine, step, move, range_m, kind,
+                    from_j, j, touched, hit,
                 )  # fmt: skip
-                row[SUB_VISITS] += number
-                row[SUB_PATH] += g * path
-            if n > 0 and j == n:
+                visits[voxel, SUB_VISITS] += number
+                visits[voxel, SUB_PATH] += g * path
+            if is_over:
                 return
         distance = max(distance, leave)
         index[k] += 1 if inverse[k] > 0.0 else -1
         if index[k] < 0 or index[k] >= shape[k]:
             return
-        facet[k] = _next_facet(origin, inverse, corner, size, index[k], k)
+        if n_parts > 0:  # from the last part of one voxel to the first of the next
+            part -= (n_parts - 1) * move[k]
+            fine[k] = leave + step[k]
+        facet[k] = _next_facet(o, inverse, corner, size, index[k], k)
 
 
 @njit(cache=True, parallel=True)
@@ -215,14 +247,12 @@ def accumulate(
     """
     n_blocks, n_shots = len(visits), len(direction)
     for block in prange(n_blocks):
-        work = (np.empty(3), np.empty(3, np.int64), np.empty(3))
-        part_work = (np.empty(3), np.empty(3, np.int64), np.empty(3), np.empty(3, np.int64))
-        part_corner = np.empty(3)
+        inverse, facet, fine, step = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+        index, place, move = np.empty(3, np.int64), np.empty(3, np.int64), np.empty(3, np.int64)
         for begin in range(block * _SEGMENT, n_shots, n_blocks * _SEGMENT):
             for i in range(begin, min(begin + _SEGMENT, n_shots)):
-                a, b = first[i], first[i + 1]
                 _march(
-                    origin[i], direction[i], zenith[i], g[i], range_m[a:b], kind[a:b], corner,
-                    shape, size, beam, lambda_1, u_max, n_parts, visits[block], hits[block],
-                    touched, hit, work, part_work, part_corner,
+                    i, origin, direction, zenith[i], g[i], first, range_m, kind, corner, shape,
+                    size, beam, lambda_1, u_max, n_parts, visits[block], hits[block], touched, hit,
+                    inverse, facet, fine, step, index, place, move,
                 )  # fmt: skip

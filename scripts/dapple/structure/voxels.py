@@ -1,16 +1,16 @@
 """Plant area density in voxels, from shots that are followed through a grid."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
-from dapple.errors import InputError, MissingMissesError
+from dapple.errors import InputError
 from dapple.formats.shots import Shots
-from dapple.structure import estimators, leaf_angles, traversal
-from dapple.structure.traversal import HIT, NOISE, WOOD
+from dapple.structure import estimators, leaf_angles, returns, traversal
+from dapple.structure.returns import Kinds
 
 ESTIMATORS = ("transmittance", "ppl", "fpl", "fpl_biased", "contact_frequency")
 """Beer-Lambert; maximum likelihood on potential and on free path length, the latter corrected for
@@ -18,8 +18,6 @@ bias and as it is; Hosoi and Omasa's contact frequency."""
 
 NOT_REACHED, TOO_FEW_SHOTS, CAPPED = 1, 2, 4
 """Bits of the variable `flag`."""
-
-Kinds = Callable[[Shots], np.ndarray] | np.ndarray | None
 
 
 @dataclass(frozen=True)
@@ -158,7 +156,7 @@ def accumulate(
     Returns
     -------
     Sums
-        The same bytes whatever the number of threads. Memory is 8 bytes × about 25 columns × up to
+        The same bytes whatever the number of threads. Memory is 8 bytes × about 25 columns × two to
         four blocks a voxel, and does not grow with the number of shots.
 
     Raises
@@ -172,8 +170,8 @@ def accumulate(
     u_max = math.sqrt(3) * grid.size_m * _largest_projection(leaf_angle_distribution)
     count = estimators.n_moments(max_pad_m2_m3 * u_max)
     n_parts = max(1, round(grid.size_m / contact_voxel_m)) if contact_voxel_m > 0 else 0
-    n_blocks = 4 if grid.n_voxels <= 2_000_000 else 2
-    # A fixed number of blocks keeps sums the same on any machine; more of them only cost memory.
+    # A number of blocks that depends on the grid alone keeps sums the same on any machine.
+    n_blocks = 4 if grid.n_voxels <= 200_000 else 2
     visits = np.zeros((n_blocks, grid.n_voxels, traversal.VISIT_MOMENTS + count))
     hits = np.zeros((n_blocks, grid.n_voxels, traversal.HIT_MOMENTS + count))
     touched, hit = np.zeros((2, grid.n_voxels, n_parts**3), np.uint8)
@@ -181,8 +179,8 @@ def accumulate(
     n_shots = n_misses = n_returns = 0
     world_origin_m = np.zeros(3)
     for chunk in [chunks] if isinstance(chunks, Shots) else chunks:
-        _check(chunk)
-        kind = _kinds(kinds, chunk, n_returns)
+        returns.check_chunk(chunk)
+        kind = returns.kinds_of_chunk(kinds, chunk, n_returns)
         zenith = np.arccos(np.minimum(np.abs(chunk.direction[:, 2]), 1.0).astype(np.float64))
         traversal.accumulate(
             np.ascontiguousarray(chunk.origin_m, np.float64),
@@ -208,7 +206,7 @@ def accumulate(
         n_misses += int(np.count_nonzero(chunk.n_returns == 0))
         n_returns += len(chunk.range_m)
         world_origin_m = np.asarray(chunk.world_origin_m, np.float64)
-    _check_all(kinds, n_shots, n_misses, n_returns, allow_missing_misses)
+    returns.check_all(kinds, n_shots, n_misses, n_returns, allow_missing_misses)
     for block in range(1, n_blocks):
         visits[0] += visits[block]
         hits[0] += hits[block]
@@ -369,101 +367,5 @@ def _dataset(sums: Sums, variables: dict, estimator: str, min_shots: int) -> xr.
     return dataset
 
 
-def kinds_of_classes(classes: np.ndarray) -> np.ndarray:
-    """Kinds of returns from class codes: 4 is leaf, 7 noise, everything else stops like wood."""
-    classes = np.asarray(classes)
-    return np.where(classes == 4, HIT, np.where(classes == 7, NOISE, WOOD)).astype(np.uint8)
-
-
-def kinds_by_place(
-    points_m: np.ndarray, classes: np.ndarray, *, voxel_size_m: float
-) -> Callable[[Shots], np.ndarray]:
-    """Kinds of returns from a classified cloud that was filtered and thinned.
-
-    A return is what most points of the cloud in its voxel are; where the cloud has none (they were
-    filtered out) it is noise.
-
-    Parameters
-    ----------
-    points_m : (n, 3) float64
-        The classified cloud in the local frame of the shots [m].
-    classes : (n,)
-        4 leaf, everything else wood. Where both are equal, leaf.
-    voxel_size_m : float
-        Edge of the voxels, as in the majority vote of the classification.
-
-    Returns
-    -------
-    callable
-        Gives the (m,) uint8 kinds of a chunk's returns, for `accumulate`.
-    """
-    index = np.floor(np.asarray(points_m, np.float64) / voxel_size_m).astype(np.int64)
-    low, high = index.min(axis=0), index.max(axis=0)
-
-    def key(i: np.ndarray) -> np.ndarray:
-        n_y, n_z = (high - low + 1)[1:]
-        return ((i[:, 0] - low[0]) * n_y + i[:, 1] - low[1]) * n_z + i[:, 2] - low[2]
-
-    known, inverse = np.unique(key(index), return_inverse=True)
-    leaf = np.bincount(inverse, np.where(np.asarray(classes) == 4, 1.0, -1.0)) >= 0
-
-    def kinds(chunk: Shots) -> np.ndarray:
-        at = np.floor(chunk.return_xyz_m / voxel_size_m).astype(np.int64)
-        inside = ((at >= low) & (at <= high)).all(axis=1)
-        place = np.minimum(np.searchsorted(known, key(at)), len(known) - 1)
-        found = inside & (known[place] == key(at))
-        return np.where(found, np.where(leaf[place], HIT, WOOD), NOISE).astype(np.uint8)
-
-    return kinds
-
-
 def _largest_projection(distribution: str) -> float:
     return float(leaf_angles.projection(distribution, np.linspace(0, np.pi / 2, 1801)).max())
-
-
-def _kinds(kinds: Kinds, chunk: Shots, at: int) -> np.ndarray:
-    """Kinds of a chunk's returns, whose first is number `at` of all."""
-    if kinds is None:
-        return np.zeros(len(chunk.range_m), np.uint8)
-    values = kinds(chunk) if callable(kinds) else kinds[at : at + len(chunk.range_m)]
-    values = np.ascontiguousarray(values, np.uint8)
-    if len(values) != len(chunk.range_m) or (len(values) and values.max() > NOISE):
-        raise InputError(
-            "kinds",
-            f"{len(values)} values up to {values.max(initial=0)}",
-            f"{len(chunk.range_m)} of {HIT} (leaf), {WOOD} (wood) or {NOISE} (noise)",
-            "Give one for each return of the shots.",
-        )
-    return values
-
-
-def _check(chunk: Shots) -> None:
-    """Refuse shots that the traversal would follow wrongly without a word."""
-    ranges, length = chunk.range_m, np.linalg.norm(chunk.direction, axis=1)
-    same = np.ones(len(ranges), bool)
-    same[chunk.first[:-1][chunk.n_returns > 0]] = (
-        False  # the first return of a shot has none before
-    )
-    if not np.isfinite(chunk.origin_m).all() or not (np.abs(length - 1) < 1e-3).all():
-        found = "origins that are not finite or directions that are no unit vectors"
-    elif not np.isfinite(ranges).all() or (np.diff(ranges, prepend=0.0)[same] < 0).any():
-        found = "ranges that are not finite or not in ascending order within a shot"
-    else:
-        return
-    raise InputError("shots", found, "finite numbers, near to far", "Write the shots again.")
-
-
-def _check_all(kinds: Kinds, n_shots: int, n_misses: int, n_returns: int, allow: bool) -> None:
-    """Refuse what only shows when all shots are read."""
-    if n_shots == 0:
-        raise InputError("shots", "none", "at least one shot", "Check the scan's window.")
-    if isinstance(kinds, np.ndarray) and len(kinds) != n_returns:
-        raise InputError("kinds", f"{len(kinds)}", f"{n_returns}, one a return", "Pass them all.")
-    if n_misses == 0 and not allow:
-        raise MissingMissesError(
-            "shots",
-            f"{n_shots} shots and no miss",
-            "shots without a return among them",
-            "Without misses plant area density comes out several times too high. Export all pulses "
-            "from the scanner's software, or let misses be rebuilt from the scanner's frame.",
-        )

@@ -1,0 +1,128 @@
+"""How long polygons and plant area density take, and how much memory.
+
+    python benchmarks/structure.py            everything, as a table
+    python benchmarks/structure.py voxels 0.2 one line
+
+Each case runs in its own process on data made here: compiled code is loaded before the clock
+starts, and the peak of memory is that of the case alone. Shots come in chunks, as from a file.
+"""
+
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "scripts"))
+
+from dapple.formats.shots import Shots
+from dapple.structure.polygons import reconstruct
+from dapple.structure.voxels import Grid, plant_area_density
+
+PUBLISHED = {
+    "polygons": "281 s on 24 cores (Frey et al. 2025)",
+    "voxels 0.2": "188 s, 8.4 GB (AMAPVox 2.4.2, all estimators, 2 cores)",
+    "voxels 1.0": "27 to 80 s (AMAPVox 2.4.2, 2 cores)",
+}
+N_SHOTS, CHUNK, PLOT_M = 2_000_000, 250_000, (20.0, 20.0, 12.0)
+
+
+def leaf_points(n_voxels: int = 156_000, n_points: int = 1_300_000) -> np.ndarray:
+    """Points in as many 5 cm voxels of a crown, in no order."""
+    rng = np.random.default_rng(1)
+    cell = np.stack(np.unravel_index(rng.permutation(120**3)[:n_voxels], (120,) * 3), axis=1)
+    count = 1 + rng.multinomial(n_points - n_voxels, rng.dirichlet(np.ones(n_voxels)))
+    points = (np.repeat(cell, count, axis=0) + rng.random((n_points, 3))) * 0.05
+    return points[rng.permutation(n_points)]
+
+
+def scan() -> Iterator[Shots]:
+    """Shots of eight scanners around a turbid crown in firing order, up to three returns each."""
+    rng = np.random.default_rng(2)
+    centre, radius_m, density_m = np.array([10.0, 10.0, 6.0]), 5.0, 0.5
+    for i in range(N_SHOTS // CHUNK):
+        angle = i * np.pi / 4
+        origin = np.array([10 + 9 * np.cos(angle), 10 + 9 * np.sin(angle), 1.6])
+        azimuth, elevation = np.meshgrid(
+            np.linspace(0, 2 * np.pi, 500, endpoint=False), np.linspace(-0.7, 1.5, CHUNK // 500)
+        )
+        azimuth, elevation = azimuth.T.ravel(), elevation.T.ravel()
+        direction = np.stack(
+            [
+                np.cos(elevation) * np.cos(azimuth),
+                np.cos(elevation) * np.sin(azimuth),
+                np.sin(elevation),
+            ],
+            axis=1,
+        )
+        along = direction @ (centre - origin)
+        half = np.sqrt(np.maximum(radius_m**2 - ((centre - origin) ** 2).sum() + along**2, 0))
+        ranges = np.maximum(along - half, 0)[:, None] + np.cumsum(
+            rng.exponential(1 / density_m, (CHUNK, 3)), axis=1
+        )
+        met = ranges < (along + half)[:, None]
+        met &= (half > 0)[:, None]
+        blank = np.zeros(met.sum(), np.float32)
+        yield Shots(
+            np.broadcast_to(origin, (CHUNK, 3)).copy(),
+            direction,
+            np.full(CHUNK, i, np.uint16),
+            np.concatenate([[0], np.cumsum(met.sum(axis=1))]),
+            ranges[met],
+            blank,
+            blank,
+            np.zeros(3),
+        )
+
+
+def time_polygons() -> str:
+    points = leaf_points()
+    reconstruct(points[:100], seed=1)
+    start = time.perf_counter()
+    mesh = reconstruct(points, seed=1)
+    seconds = time.perf_counter() - start
+    return f"{seconds:6.2f} s | {len(points):,} points, {mesh.n_elements:,} polygons"
+
+
+def time_voxels(size_m: float) -> str:
+    grid = Grid.around(np.array([[0, 0, 0], PLOT_M]), size_m)
+    first = next(scan())
+    plant_area_density(first, Grid(grid.corner_m, (1, 1, 1), size_m))
+    waited = 0.0
+
+    def chunks() -> Iterator[Shots]:
+        """Make shots while the clock stands still."""
+        nonlocal waited
+        begin = time.perf_counter()
+        for chunk in scan():
+            waited += time.perf_counter() - begin
+            yield chunk
+            begin = time.perf_counter()
+
+    start = time.perf_counter()
+    result = plant_area_density(chunks(), grid)
+    seconds = time.perf_counter() - start - waited
+    return (
+        f"{seconds:6.2f} s | {result.attrs['total_shots']:,} shots, "
+        f"{result['n_shots'].size:,} voxels, every estimator"
+    )
+
+
+def main() -> None:
+    if len(sys.argv) > 1:
+        line = time_polygons() if sys.argv[1] == "polygons" else time_voxels(float(sys.argv[2]))
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+        print(f"{line} | {peak:.2f} GB")
+        return
+    print("case       |     time | size | peak memory | published")
+    for case, published in PUBLISHED.items():
+        command = [sys.executable, __file__, *case.split()]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        print(f"{case:10} | {done.stdout.strip()} | {published}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

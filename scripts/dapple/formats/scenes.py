@@ -1,0 +1,30 @@
+"""Scenes from the files of a reconstruction."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from dapple.formats import meshes, voxels
+from dapple.light.scene import Scene
+
+
+def read(leaves: Sequence[str], wood: str, ground_z_m: float = 0.0) -> list[Scene]:
+    """Put together what light meets, once for every placement of the leaves.
+
+    Parameters
+    ----------
+    leaves : sequence of path
+        PLY meshes, one a placement, or a NetCDF voxel grid.
+    wood : path
+        PLY mesh.
+    ground_z_m : float
+        Height of the ground [m].
+    """
+    branches = meshes.read_ply(wood)
+    scenes = []
+    for path in map(Path, leaves):
+        if path.suffix == ".nc":
+            scenes.append(Scene({"wood": branches}, voxels.read(path), ground_z_m))
+        else:
+            leaf = meshes.read_ply(path)
+            scenes.append(Scene({"leaf": leaf, "wood": branches}, None, ground_z_m))
+    return scenes

@@ -1,0 +1,169 @@
+"""PAR through the day from what was traced once: direct, sky and scattered light added up."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from dapple.formats.light import time_coordinate, times
+from dapple.frames import direction_from_angles
+from dapple.light.direct import Sunlit
+from dapple.light.patches import patches
+from dapple.light.scene import Optics
+from dapple.light.sky import patch_radiance
+from dapple.light.transport import Transport, summed_irradiance, sun_radiance
+
+PARTS = {
+    "par_umol_m2_s": "photosynthetically active radiation",
+    "par_direct_umol_m2_s": "PAR straight from the sun",
+    "par_sky_umol_m2_s": "PAR straight from the sky",
+    "par_scattered_umol_m2_s": "PAR scattered by leaves, bark and ground",
+    "standard_error_umol_m2_s": "standard error of PAR",
+}
+
+
+def towards_sun(sky: xr.Dataset) -> np.ndarray:
+    """(t, 3) unit vectors towards the sun at the times of a sky dataset."""
+    return direction_from_angles(
+        sky["sun_zenith_deg"].to_numpy(), sky["sun_azimuth_deg"].to_numpy()
+    )
+
+
+def open_sky_par(sky: xr.Dataset) -> xr.DataArray:
+    """Horizontal PAR without a tree at the times of a sky dataset [µmol m⁻² s⁻¹]."""
+    upward = np.maximum(np.cos(np.radians(sky["sun_zenith_deg"])), 0)
+    beam = sky["beam_normal_umol_m2_s"].sum("band")
+    return beam * upward + sky["diffuse_horizontal_umol_m2_s"].sum("band")
+
+
+@dataclass(frozen=True)
+class Light:
+    """PAR at n sensors and t times [µmol m⁻² s⁻¹].
+
+    Attributes
+    ----------
+    direct, sky, scattered : (n, t) float64
+        Straight from the sun, straight from the sky, scattered by leaves, bark and ground.
+    standard_error : (n, t) float64
+        Of their sum, for the rays and paths that were traced.
+    """
+
+    direct: np.ndarray
+    sky: np.ndarray
+    scattered: np.ndarray
+    standard_error: np.ndarray
+
+    @property
+    def par(self) -> np.ndarray:
+        """(n, t) sum of the parts."""
+        return self.direct + self.sky + self.scattered
+
+
+def compute(
+    sunlit: Sunlit,
+    transport: Transport,
+    sky: xr.Dataset,
+    optics: Optics,
+    *,
+    sun_kernel_deg: float,
+) -> Light:
+    """Light of one scene from what was traced in it.
+
+    Parameters
+    ----------
+    sunlit : Sunlit
+        Share of the solar disc that is seen at the times of the sky.
+    transport : Transport
+        Counted paths of the same sensors.
+    sky : xarray.Dataset
+        Sun and sky at t times in b bands.
+    optics : Optics
+        In b bands.
+    sun_kernel_deg : float
+        Over which angle around the sun scattered paths are averaged [deg].
+
+    Returns
+    -------
+    Light
+    """
+    subdivision = patches(transport.n_patches)
+    sun = towards_sun(sky)
+    beam = sky["beam_normal_umol_m2_s"].transpose("time", "band").to_numpy()
+    diffuse = sky["diffuse_horizontal_umol_m2_s"].transpose("time", "band").to_numpy()
+    radiance = patch_radiance(
+        sky["perez"].to_numpy(),
+        sky["sun_zenith_deg"].to_numpy(),
+        sky["sun_azimuth_deg"].to_numpy(),
+        subdivision,
+    )
+    spread = sun_radiance(sun, subdivision, kernel_deg=sun_kernel_deg)
+    straight = summed_irradiance(transport, radiance, diffuse, optics, scattered=False)
+    scattered = summed_irradiance(transport, radiance, diffuse, optics)
+    scattered += summed_irradiance(transport, spread, beam, optics)
+    level_beam = beam.sum(axis=1) * np.maximum(sun[:, 2], 0)
+    # Shadow rays and paths are drawn independently: their variances add.
+    variance = (straight + scattered).var(axis=1, ddof=1) / transport.n_replicates
+    return Light(
+        direct=sunlit.share.mean(axis=0) * level_beam,
+        sky=straight.mean(axis=1),
+        scattered=scattered.mean(axis=1),
+        standard_error=np.sqrt(variance + (sunlit.standard_error * level_beam) ** 2),
+    )
+
+
+def summarise(placements: list[Light], sensors: list[str], sky: xr.Dataset) -> xr.Dataset:
+    """Mean and standard error over placements of leaves.
+
+    Parameters
+    ----------
+    placements : list of Light
+        One for each placement of virtual leaves, a single one where leaves are real.
+    sensors : list of str
+        Labels.
+    sky : xarray.Dataset
+        For its times.
+
+    Returns
+    -------
+    xarray.Dataset
+        The light series. With several placements the standard error is that of their mean, which
+        includes that of the paths.
+    """
+    error = placements[0].standard_error
+    if len(placements) > 1:
+        error = np.std([p.par for p in placements], axis=0, ddof=1) / np.sqrt(len(placements))
+    direct, straight, scattered = (
+        np.mean([getattr(p, part) for p in placements], axis=0)
+        for part in ("direct", "sky", "scattered")
+    )
+    return dataset(
+        sensors,
+        times(sky),
+        par=direct + straight + scattered,
+        direct=direct,
+        sky=straight,
+        scattered=scattered,
+        standard_error=error,
+    )
+
+
+def dataset(
+    sensors: list[str],
+    when: pd.DatetimeIndex,
+    *,
+    par: np.ndarray,
+    direct: np.ndarray,
+    sky: np.ndarray,
+    scattered: np.ndarray,
+    standard_error: np.ndarray,
+) -> xr.Dataset:
+    """Light at sensors and times, arrays of shape (n_sensors, t), as a dataset."""
+    values = (par, direct, sky, scattered, standard_error)
+    return xr.Dataset(
+        {
+            name: (("sensor", "time"), value, {"units": "µmol m-2 s-1", "long_name": text})
+            for (name, text), value in zip(PARTS.items(), values, strict=True)
+        },
+        coords={"sensor": sensors, "time": time_coordinate(when)},
+    )

@@ -1,0 +1,106 @@
+"""What the returns of shots are: leaf hits, wood, noise; and whether shots can be followed."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from dapple.errors import InputError, MissingMissesError
+from dapple.formats.shots import Shots
+from dapple.structure.traversal import HIT, NOISE, WOOD
+
+Kinds = Callable[[Shots], np.ndarray] | np.ndarray | None
+"""A function of a chunk, an array for the returns of all chunks, or None: all are leaf hits."""
+
+
+def kinds_of_classes(classes: np.ndarray) -> np.ndarray:
+    """Kinds of returns from class codes: 4 is leaf, 7 noise, everything else stops like wood."""
+    classes = np.asarray(classes)
+    return np.where(classes == 4, HIT, np.where(classes == 7, NOISE, WOOD)).astype(np.uint8)
+
+
+def kinds_by_place(
+    points_m: np.ndarray, classes: np.ndarray, *, voxel_size_m: float
+) -> Callable[[Shots], np.ndarray]:
+    """Kinds of returns from a classified cloud that was filtered and thinned.
+
+    A return is what most points of the cloud in its voxel are; where the cloud has none (they were
+    filtered out) it is noise.
+
+    Parameters
+    ----------
+    points_m : (n, 3) float64
+        The classified cloud in the local frame of the shots [m].
+    classes : (n,)
+        4 leaf, everything else wood. Where both are equal, leaf.
+    voxel_size_m : float
+        Edge of the voxels, as in the majority vote of the classification.
+
+    Returns
+    -------
+    callable
+        Gives the (m,) uint8 kinds of a chunk's returns, for `accumulate`.
+    """
+    index = np.floor(np.asarray(points_m, np.float64) / voxel_size_m).astype(np.int64)
+    low, high = index.min(axis=0), index.max(axis=0)
+
+    def key(i: np.ndarray) -> np.ndarray:
+        n_y, n_z = (high - low + 1)[1:]
+        return ((i[:, 0] - low[0]) * n_y + i[:, 1] - low[1]) * n_z + i[:, 2] - low[2]
+
+    known, inverse = np.unique(key(index), return_inverse=True)
+    leaf = np.bincount(inverse, np.where(np.asarray(classes) == 4, 1.0, -1.0)) >= 0
+
+    def kinds(chunk: Shots) -> np.ndarray:
+        at = np.floor(chunk.return_xyz_m / voxel_size_m).astype(np.int64)
+        inside = ((at >= low) & (at <= high)).all(axis=1)
+        place = np.minimum(np.searchsorted(known, key(at)), len(known) - 1)
+        found = inside & (known[place] == key(at))
+        return np.where(found, np.where(leaf[place], HIT, WOOD), NOISE).astype(np.uint8)
+
+    return kinds
+
+
+def kinds_of_chunk(kinds: Kinds, chunk: Shots, at: int) -> np.ndarray:
+    """Kinds of a chunk's returns, whose first is number `at` of all."""
+    if kinds is None:
+        return np.zeros(len(chunk.range_m), np.uint8)
+    values = kinds(chunk) if callable(kinds) else kinds[at : at + len(chunk.range_m)]
+    values = np.ascontiguousarray(values, np.uint8)
+    if len(values) != len(chunk.range_m) or (len(values) and values.max() > NOISE):
+        raise InputError(
+            "kinds",
+            f"{len(values)} values up to {values.max(initial=0)}",
+            f"{len(chunk.range_m)} of {HIT} (leaf), {WOOD} (wood) or {NOISE} (noise)",
+            "Give one for each return of the shots.",
+        )
+    return values
+
+
+def check_chunk(chunk: Shots) -> None:
+    """Refuse shots that the traversal would follow wrongly without a word."""
+    ranges, length = chunk.range_m, np.linalg.norm(chunk.direction, axis=1)
+    same = np.ones(len(ranges), bool)  # of the same shot as the return before
+    same[chunk.first[:-1][chunk.n_returns > 0]] = False
+    if not np.isfinite(chunk.origin_m).all() or not (np.abs(length - 1) < 1e-3).all():
+        found = "origins that are not finite or directions that are no unit vectors"
+    elif not np.isfinite(ranges).all() or (np.diff(ranges, prepend=0.0)[same] < 0).any():
+        found = "ranges that are not finite or not in ascending order within a shot"
+    else:
+        return
+    raise InputError("shots", found, "finite numbers, near to far", "Write the shots again.")
+
+
+def check_all(kinds: Kinds, n_shots: int, n_misses: int, n_returns: int, allow: bool) -> None:
+    """Refuse what only shows when all shots are read."""
+    if n_shots == 0:
+        raise InputError("shots", "none", "at least one shot", "Check the scan's window.")
+    if isinstance(kinds, np.ndarray) and len(kinds) != n_returns:
+        raise InputError("kinds", f"{len(kinds)}", f"{n_returns}, one a return", "Pass them all.")
+    if n_misses == 0 and not allow:
+        raise MissingMissesError(
+            "shots",
+            f"{n_shots} shots and no miss",
+            "shots without a return among them",
+            "Without misses plant area density comes out several times too high. Export all pulses "
+            "from the scanner's software, or let misses be rebuilt from the scanner's frame.",
+        )

@@ -1,0 +1,17 @@
+"""One self-contained page that tells the run."""
+
+from pathlib import Path
+
+from dapple.figures import page
+from dapple.formats.atomic import atomic
+from dapple.workflow import run
+
+
+def main(snakemake):
+    folder = Path(snakemake.output.page).parent
+    with atomic(snakemake.output.page) as partial:
+        partial.write_text(page.build(snakemake.params.experiment, folder), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

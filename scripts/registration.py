@@ -1,0 +1,43 @@
+"""Fit the origin of the tree's frame and the clock offset on a part of the records."""
+
+import numpy as np
+
+from dapple.formats import json, scenes
+from dapple.light import measured, sensors, shade
+from dapple.light.sky import sky_dataset
+from dapple.light.sun import Site, broadband
+from dapple.workflow import run
+
+
+def main(snakemake):
+    params, inputs = snakemake.params, snakemake.input
+    if not params.fit:
+        facts = {"fitted": False, "origin_m": params.origin_m, "clock_offset_s": 0.0}
+        json.write(snakemake.output.registration, facts)
+        return
+    site = Site(**params.site)
+
+    def sky_at(times):
+        radiation = broadband(times, site, path=inputs.radiation or None, **params.radiation)
+        return sky_dataset(times, site, radiation, **params.atmosphere)
+
+    table = sensors.read(inputs.sensors, params.origin_m)
+    found = shade.register(
+        scenes.read(inputs.leaves, inputs.wood),
+        table,
+        measured.read(inputs.measured, sensors=table),
+        sky_at=sky_at,
+        max_shift_m=params.max_shift_m,
+        max_clock_offset_s=params.max_clock_offset_s,
+        split_by=params.split,
+        fit_share=params.fit_share,
+        variant=params.variant,
+        seed=params.seed,
+    )
+    shift_m = np.array([found["east_m"], found["north_m"], 0.0])
+    origin_m = np.array(params.origin_m) + shift_m
+    json.write(snakemake.output.registration, {"fitted": True, "origin_m": origin_m, **found})
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

@@ -1,0 +1,18 @@
+"""Time and memory of every step, from Snakemake's benchmark files."""
+
+from pathlib import Path
+
+from dapple.formats.atomic import atomic
+from dapple.stats import runtime
+from dapple.workflow import run
+
+
+def main(snakemake):
+    folder = Path(snakemake.params.benchmarks)
+    table = runtime.collect(sorted(folder.rglob("*.tsv")), folder, snakemake.params.reconstructions)
+    with atomic(snakemake.output.runtime) as partial:
+        table.to_csv(partial, index=False, float_format="%.2f")
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

@@ -1,0 +1,32 @@
+"""Sensors in the local frame, none of them outside the scene or inside a leaf."""
+
+from dapple.formats import json, meshes
+from dapple.formats.atomic import atomic
+from dapple.light import sensors
+from dapple.workflow import run
+
+
+def main(snakemake):
+    params, inputs = snakemake.params, snakemake.input
+    wood = meshes.read_ply(inputs.wood)
+    if params.kind == "table":
+        origin_m = json.read(inputs.registration)["origin_m"]
+        table = sensors.read(inputs.table, origin_m)
+    else:
+        table = sensors.grid_around(
+            sensors.stem_position(wood),
+            columns=params.columns,
+            rows=params.rows,
+            spacing_m=params.spacing_m,
+            height_m=params.height_m,
+            ground_z_m=params.ground_z_m,
+        )
+    for path in inputs.leaves:
+        geometry = {"leaf": meshes.read_ply(path), "wood": wood}
+        sensors.check(table, geometry, where=str(inputs.table or "sensors"))
+    with atomic(snakemake.output.sensors) as partial:
+        table.to_csv(partial, index=False)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

@@ -1,0 +1,33 @@
+"""Measured and simulated PAR through the day at chosen sensors."""
+
+import pandas as pd
+
+from dapple.figures import series, style
+from dapple.formats import light
+from dapple.stats import correlation
+from dapple.stats.records import simulated
+from dapple.workflow import run
+
+
+def main(snakemake):
+    params, inputs = snakemake.params, snakemake.input
+    if inputs.records:
+        records = pd.read_csv(inputs.records, parse_dates=["time"], dtype={"sensor": str})
+        r = correlation.per_sensor(records)
+    else:
+        tables = [
+            simulated(light.read(path), name)
+            for name, path in zip(params.reconstructions, inputs.light, strict=True)
+        ]
+        records, r = pd.concat(tables, ignore_index=True), None
+    chosen = list(params.sensors)
+    if not chosen and r is not None:
+        chosen = series.choose_sensors(r, reconstruction=params.reconstructions[0])
+    if not chosen:
+        chosen = list(records["sensor"].unique()[:: max(1, records["sensor"].nunique() // 6)][:6])
+    figure = series.draw(records, chosen, timezone=params.timezone, per_sensor=r)
+    style.save(figure, snakemake.output.figure)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

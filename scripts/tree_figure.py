@@ -1,0 +1,17 @@
+"""The reconstructed tree from the side and from above, with the sensors."""
+
+import pandas as pd
+
+from dapple.figures import style, tree
+from dapple.formats import scenes
+from dapple.workflow import run
+
+
+def main(snakemake):
+    scene = scenes.read([snakemake.input.leaves], snakemake.input.wood)[0]
+    sensors = pd.read_csv(snakemake.input.sensors)
+    style.save(tree.draw(scene, sensors=sensors), snakemake.output.figure)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)
