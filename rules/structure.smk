@@ -122,3 +122,19 @@ rule voxels:
         "{settings.experiment}: plant area density in {wildcards.size} m voxels"
     script:
         "../scripts/voxels.py"
+
+
+rule export:
+    input:
+        expand(
+            results("structure/{meshed}/{kind}.{axes}.obj"),
+            meshed=[
+                name
+                for name in settings.reconstructions
+                if name in ("polygons", "truth")
+            ],
+            kind=["leaves", "wood"],
+            axes=["less", "dart"],
+        ),
+    message:
+        "{settings.experiment}: OBJ for LESS and DART"

@@ -167,6 +167,6 @@ def test_without_a_hit_the_standard_error_is_that_of_one():
 
 def test_contact_frequency_is_the_share_of_sub_voxels_met():
     pad = estimators.contact_frequency(
-        np.array([3, 0, 0]), np.array([30, 30, 0]), np.array([0.02, 0.02, np.nan])
+        np.array([3, 0, 0]), np.array([30, 30, 0]), np.array([1.07, 1.07, np.nan]), 0.05
     )
-    assert pad == pytest.approx([0.1 / 0.02, 0, 0])
+    assert pad == pytest.approx([1.07 / 0.05 * 0.1, 0, 0])

@@ -244,9 +244,18 @@ def test_contact_frequency_counts_sub_voxels():
         [[1.05], [], []],
     )
     result = plant_area_density(shots, column(1), contact_voxel_m=0.1, min_shots=1)
-    # 20 sub-voxels are visited, one holds a hit, the mean optical path in one is 0.5 · 0.1 m.
+    # 20 sub-voxels are visited, one holds a hit; cosθ/G is 2 for beams straight up.
     density = in_column(result, "pad_contact_frequency_m2_m3")[0]
-    assert density == pytest.approx(min((1 / 20) / 0.05, 5.0))
+    assert density == pytest.approx(2 / 0.1 * 1 / 20)
+
+
+def test_contact_frequency_corrects_for_the_beams_angle():
+    slanted = shots_of([0.5, 0.5, 0.001], [1, 0, np.sqrt(3)], [[0.3]] * 6 + [[]] * 6)
+    sums = accumulate(slanted, column(1), contact_voxel_m=0.1)
+    density = in_column(estimate(sums), "pad_contact_frequency_m2_m3")[0]
+    expected = np.cos(np.radians(30)) / 0.5 / 0.1 * sums.n_hit_parts[0] / sums.n_touched_parts[0]
+    assert sums.n_hit_parts[0] == 1
+    assert density == pytest.approx(expected)
 
 
 def test_a_sub_voxel_behind_the_last_echo_is_not_visited():

@@ -15,7 +15,7 @@ from dapple.light.traced import TracedScene
 
 PLASTIC_STEPS = (3242174889, 2447445414)
 """2³² over the plastic number and over its square: steps of the R2 sequence (Roberts 2018)."""
-PATHS_PER_KERNEL = 1 << 22
+PATHS_PER_KERNEL = 1 << 17
 """Bounds memory: a path takes about 150 bytes."""
 
 
@@ -110,6 +110,7 @@ def trace(
 def _trace_block(scene, points, start, number, seed, max_orders, halved_after, radius):
     """Trace the paths of one kernel; those that were absorbed by chance are left out."""
     mi = scene.mi
+    n = len(number)
     start, number = mi.UInt32(start.astype(np.uint32)), mi.UInt32(number.astype(np.uint32))
     point, shift = mi.sample_tea_32(start, seed)
     state, sequence = mi.sample_tea_32(point + number, shift)
@@ -119,7 +120,7 @@ def _trace_block(scene, points, start, number, seed, max_orders, halved_after, r
     centre = mi.Point3f(*(dr.gather(mi.Float, axis, start) for axis in points))
     origin = centre + radius * mi.Vector3f(on_disc.x, on_disc.y, 0)
     direction, escaped, alive, weight, *orders = _follow(
-        mi, scene, origin, mi.Vector3f(first), rng, mi.Bool(True), max_orders, halved_after
+        mi, scene, origin, mi.Vector3f(first), rng, dr.full(mi.Bool, True, n), max_orders, halved_after
     )
     kept = dr.compress(escaped | alive)
     packed = orders[0] | orders[1] << 8 | orders[2] << 16 | orders[3] << 24
@@ -171,7 +172,7 @@ def _follow(mi, scene, origin, direction, rng, active, max_orders, halved_after)
     a, b, c, d = mi.UInt32(0), mi.UInt32(0), mi.UInt32(0), mi.UInt32(0)
     met, weight = mi.UInt32(0), mi.UInt32(1)
     escaped, cut = mi.Bool(False), mi.Bool(False)
-    while active:
+    while dr.hint(active, mode="evaluated", compress=True):
         point, normal, leaf, voxel, bark, ground, crossed = scene.segment(
             origin, direction, rng, active
         )

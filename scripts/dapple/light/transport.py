@@ -299,9 +299,10 @@ def irradiance(
     n_bands = len(optics) if scattered else 1
     shape = (len(transport.n_paths), transport.n_replicates, len(radiance), n_bands)
     result = np.zeros(shape)
-    for sensor, orders, by_kind in _by_kind(transport, radiance, scattered):
-        factor = spectral_factor(orders, optics)[:, :n_bands]
-        result[sensor] = np.einsum("rkt,kb->rtb", by_kind, factor, optimize=True)
+    kinds, pieces = _by_kind(transport, radiance, scattered)
+    factor = spectral_factor(kinds, optics)[:, :n_bands]
+    for sensor, mine, light in pieces:
+        result[sensor] = np.einsum("rkt,kb->rtb", light, factor[mine], optimize=True)
     return result
 
 
@@ -328,34 +329,39 @@ def summed_irradiance(
         In units of the radiance times sr times the flux.
     """
     result = np.zeros((len(transport.n_paths), transport.n_replicates, len(radiance)))
-    for sensor, orders, by_kind in _by_kind(transport, radiance, scattered):
-        passed = spectral_factor(orders, optics) @ flux.T
-        result[sensor] = np.einsum("rkt,kt->rt", by_kind, passed)
+    kinds, pieces = _by_kind(transport, radiance, scattered)
+    passed = spectral_factor(kinds, optics) @ flux.T
+    for sensor, mine, light in pieces:
+        result[sensor] = np.einsum("rkt,kt->rt", light, passed[mine])
     return result
 
 
-def _by_kind(
-    transport: Transport, radiance: np.ndarray, scattered: bool
-) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-    """For each sensor its kinds of paths (k, 4) and the sky's light along them (r, k, t)."""
+def _by_kind(transport: Transport, radiance: np.ndarray, scattered: bool):
+    """Kinds of paths (k, 4), and for each sensor which it has and the sky's light along them.
+
+    The second is an iterator over sensor, kinds (m,) and light (r, m, t).
+    """
     met = transport.orders.any(axis=1)
     chosen = np.flatnonzero(met if scattered else ~met)
+    packed = np.ascontiguousarray(transport.orders[chosen]).view("<u4").ravel()
+    kinds, kind = np.unique(packed, return_inverse=True)
     bounds = np.searchsorted(transport.sensor[chosen], np.arange(len(transport.n_paths) + 1))
     by_patch = np.ascontiguousarray(radiance.T)
-    for sensor in np.flatnonzero(np.diff(bounds)):
-        mine = chosen[bounds[sensor] : bounds[sensor + 1]]
-        orders = np.ascontiguousarray(transport.orders[mine])
-        _, first, kind = np.unique(
-            orders.view("<u4").ravel(), return_index=True, return_inverse=True
-        )
-        weight = np.pi / transport.n_paths[sensor] * transport.count[mine]
-        row = transport.replicate[mine].astype(np.int64) * len(first) + kind
-        counted = sparse.csr_array(
-            (weight, (row, transport.patch[mine])),
-            shape=(transport.n_replicates * len(first), transport.n_patches),
-        )
-        by_kind = counted @ by_patch
-        yield sensor, orders[first], by_kind.reshape(transport.n_replicates, len(first), -1)
+    n_replicates = transport.n_replicates
+
+    def pieces() -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
+        for sensor in np.flatnonzero(np.diff(bounds)):
+            part = slice(bounds[sensor], bounds[sensor + 1])
+            rows = chosen[part]
+            mine, own_kind = np.unique(kind[part], return_inverse=True)
+            row = transport.replicate[rows].astype(np.int64) * len(mine) + own_kind
+            counted = sparse.csr_array(
+                (transport.count[rows] * (np.pi / transport.n_paths[sensor]), (row, transport.patch[rows])),
+                shape=(n_replicates * len(mine), transport.n_patches),
+            )
+            yield sensor, mine, (counted @ by_patch).reshape(n_replicates, len(mine), -1)
+
+    return kinds.astype("<u4").view(np.uint8).reshape(-1, 4), pieces()
 
 
 def sun_radiance(sun_directions: np.ndarray, sky: Patches, *, kernel_deg: float) -> np.ndarray:

@@ -118,7 +118,7 @@ def free_path(
 
 
 def contact_frequency(
-    n_hit: np.ndarray, n_touched: np.ndarray, mean_path: np.ndarray
+    n_hit: np.ndarray, n_touched: np.ndarray, factor: np.ndarray, size_m: float
 ) -> np.ndarray:
     """Estimate PAD from the share of the sub-voxels visited that hold a leaf hit.
 
@@ -126,8 +126,10 @@ def contact_frequency(
     ----------
     n_hit, n_touched : (v,)
         Number of sub-voxels with a leaf hit, and with any beam (n₁ and n₁ + n_p).
-    mean_path : (v,) float64
-        Mean optical path G·δ of the beams in a sub-voxel [m].
+    factor : (v,) float64
+        Mean of cosθ/G(θ) of the beams that visited them, θ from the vertical.
+    size_m : float
+        Edge of the sub-voxels.
 
     Returns
     -------
@@ -136,14 +138,14 @@ def contact_frequency(
 
     Notes
     -----
-    Hosoi and Omasa (2006), IEEE TGRS 44, 3610-3618, equations 5 to 9, where the frequency is
-    multiplied by cosθ/(G·thickness) of a layer of sub-voxels. Here 1/mean(G·δ) takes the place of
-    that factor, so that oblique and level beams count by the path that they have in a sub-voxel.
-    The estimate depends on the size of the sub-voxels and on how many beams visit each: it rises
-    with either, because one hit among many beams makes a sub-voxel count as a contact.
+    Hosoi and Omasa (2006), IEEE TGRS 44, 3610-3618: the factor over the size, times n₁/(n₁ + n_p).
+    It is a share of places, not of beams: it rises with the beams that visit a sub-voxel, until
+    each that holds a leaf has been hit, and with the sub-voxels' size where this is not small
+    against leaves. Level beams, whose cosθ is 0, count as if there were no leaf. Take it to
+    compare with studies that used it; the other estimators know how far each beam came.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(n_hit > 0, n_hit / (n_touched * mean_path), 0.0)
+        return np.where(n_hit > 0, factor / size_m * n_hit / n_touched, 0.0)
 
 
 def transmittance(

@@ -8,7 +8,7 @@ from numba import njit, prange
 HIT, WOOD, NOISE = 0, 1, 2
 """What an echo is: a leaf hit; wood; noise. Only the first is a hit, all weaken the beam."""
 
-N_SHOTS, PATH, ANGLE, FREE, SUB_VISITS, SUB_PATH, VISIT_MOMENTS = range(7)
+N_SHOTS, PATH, ANGLE, FREE, PARTS, PART_FACTOR, VISIT_MOMENTS = range(7)
 """Columns of the sums of everything that enters a voxel, the moments last."""
 
 N_HITS, HIT_FREE, HIT_MOMENTS = range(3)
@@ -110,10 +110,10 @@ def _visit_parts(
 ):  # fmt: skip
     """Mark the parts of one voxel that a beam visits from `distance` to `stop` or `leave`.
 
-    Returns the part it is in at the end, how many it visited, and the sum of the chords in them.
+    Returns the part it is in at the end, and how many it visited.
     """
     tx, ty, tz = fine[0], fine[1], fine[2]
-    visits, enter, j = 0, distance, first
+    visits, j = 0, first
     while True:
         facet = min(tx, ty, tz, leave)
         if facet - distance > near and 0 <= part < touched.shape[1]:
@@ -127,7 +127,7 @@ def _visit_parts(
             distance = facet
         if facet >= leave - near or distance >= stop:
             fine[0], fine[1], fine[2] = tx, ty, tz
-            return part, visits, distance - enter
+            return part, visits
         # Which facet comes next is hard to foresee: choose without branches.
         on_x = (tx <= ty) & (tx <= tz)
         on_y = (not on_x) & (ty <= tz)
@@ -191,12 +191,12 @@ def _march(
                 _add_moments(visits, voxel, VISIT_MOMENTS, whole, t)
             if n_parts > 0:
                 stop = range_m[end - 1] if is_over else leave
-                part, number, path = _visit_parts(
+                part, number = _visit_parts(
                     voxel, part, distance, leave, stop, near, fine, step, move, range_m, kind,
                     from_j, j, touched, hit,
                 )  # fmt: skip
-                visits[voxel, SUB_VISITS] += number
-                visits[voxel, SUB_PATH] += g * path
+                visits[voxel, PARTS] += number
+                visits[voxel, PART_FACTOR] += number * math.cos(zenith) / g
             if is_over:
                 return
         distance = max(distance, leave)

@@ -324,11 +324,11 @@ def _densities(sums: Sums) -> dict[str, np.ndarray]:
         u, hit_weight, weight[met], np.maximum(0.5 * sums.u_max * passing, 0.0), cap
     )
     pad |= {"fpl": corrected, "fpl_biased": biased}
-    if sums.settings["contact_voxel_m"] > 0:
+    if (part_m := sums.settings["contact_voxel_m"]) > 0:
         with np.errstate(invalid="ignore"):
-            mean_path = visits[:, traversal.SUB_PATH] / visits[:, traversal.SUB_VISITS]
+            factor = visits[:, traversal.PART_FACTOR] / visits[:, traversal.PARTS]
         pad["contact_frequency"] = estimators.contact_frequency(
-            sums.n_hit_parts, sums.n_touched_parts, mean_path
+            sums.n_hit_parts, sums.n_touched_parts, factor, part_m
         )
     return pad | {"standard_error": error}
 
