@@ -86,10 +86,11 @@ def optics(n_bands: int = 61) -> Optics:
 
 
 def sky(n_times: int = 306, n_bands: int = 61) -> xr.Dataset:
-    """A clear afternoon: the sun from 35° to 85° from the zenith, a circumsolar sky."""
-    zenith = np.linspace(35, 80, n_times)
-    azimuth = np.linspace(190, 280, n_times)
-    beam = 1900 * np.exp(-0.3 / np.cos(np.radians(zenith)))
+    """A clear afternoon in August: a tenth to a fifth of light from a sky bright about the sun."""
+    zenith = np.linspace(33, 65, n_times)
+    azimuth = np.linspace(180, 270, n_times)
+    beam = 2500 * np.exp(-0.3 / np.cos(np.radians(zenith)))
+    diffuse = 250 * np.cos(np.radians(zenith)) ** 0.4
     per_band = np.ones(n_bands) / n_bands
     units = {"units": "µmol m-2 s-1", "long_name": "light"}
     start = pd.Timestamp("2023-08-10 11:30", tz="UTC")
@@ -99,11 +100,7 @@ def sky(n_times: int = 306, n_bands: int = 61) -> xr.Dataset:
             "sun_zenith_deg": ("time", zenith),
             "sun_azimuth_deg": ("time", azimuth),
             "beam_normal_umol_m2_s": (("time", "band"), beam[:, None] * per_band, units),
-            "diffuse_horizontal_umol_m2_s": (
-                ("time", "band"),
-                np.full((n_times, 1), 250.0) * per_band,
-                units,
-            ),
+            "diffuse_horizontal_umol_m2_s": (("time", "band"), diffuse[:, None] * per_band, units),
             "perez": (
                 ("time", "coefficient"),
                 np.tile([-1.0, -0.3, 10.0, -3.0, 0.45], (n_times, 1)),

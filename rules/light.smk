@@ -34,7 +34,7 @@ rule registration:
         mem_mb=4000,
     params:
         **dict(settings.registration),
-        **SKY,
+        **(SKY if settings.registration.fit else {}),
         variant=VARIANT,
         seed=stream("registration"),
     message:

@@ -8,7 +8,9 @@ from dapple.workflow import run
 
 def main(snakemake):
     times = [light.read(path) for path in snakemake.input.times]
-    series = xr.concat(times, "time", data_vars="minimal", coords="minimal", combine_attrs="drop_conflicts")
+    series = xr.concat(
+        times, "time", data_vars="minimal", coords="minimal", combine_attrs="drop_conflicts"
+    )
     light.write(snakemake.output.light, series)
 
 

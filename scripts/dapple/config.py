@@ -6,19 +6,23 @@ The default configuration, its schema and its documentation are made from these 
 
 from __future__ import annotations
 
-import difflib
+from datetime import datetime
 from math import sqrt
 from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Gt, Le
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from dapple.errors import InputError
+from dapple import config_checks
 
 Positive = Annotated[float, Gt(0)]
 NotNegative = Annotated[float, Ge(0)]
 Share = Annotated[float, Ge(0), Le(1)]
 Count = Annotated[int, Ge(1)]
+# YAML reads a time with seconds as a time, one without as text.
+Moment = Annotated[
+    str, BeforeValidator(lambda value: str(value) if isinstance(value, datetime) else value)
+]
 LeafAngles = Literal[
     "spherical", "planophile", "erectophile", "plagiophile", "extremophile", "uniform"
 ]
@@ -50,6 +54,7 @@ class Plant(Section):
     leaf_area_m2: Positive = _(90.0, "one-sided leaf area")
     leaf_length_min_m: Positive = _(0.05, "shortest leaf")
     leaf_length_max_m: Positive = _(0.08, "longest leaf")
+    leaf_angle_distribution: LeafAngles = _("spherical", "of the leaf normals")
 
 
 class Leaves(Section):
@@ -58,7 +63,14 @@ class Leaves(Section):
     placements: Count = _(8, "independent placements; light is their mean")
     leaf_area_m2: Positive = _(187.0, "area of all leaf polygons", FREY)
     n_elements: Count = _(147_098, "leaf polygons, one in a 5 cm voxel", FREY)
-    small_share: Share = _(40_190 / 147_098, "share of polygons made of one or two points", FREY)
+    small_share: Share = _(
+        round(40_190 / 147_098, 4), "share of polygons made of one or two points", FREY
+    )
+    crown_base_m: NotNegative = _(2.1, "no leaf is lower above the stem's foot", FREY)
+    max_distance_m: Positive = _(0.3, "longest shoot")
+    clump_radius_m: Positive = _(0.06, "spread of leaves across their shoot")
+    thin_wood_m2: Positive = _(0.001, "wood polygons of this area carry half as many shoots")
+    leaf_angle_distribution: LeafAngles = _("spherical", "of the polygons' normals", FREY)
 
 
 class Scan(Section):
@@ -162,8 +174,8 @@ class Site(Section):
 class Time(Section):
     """The times to be simulated."""
 
-    start: str = _("2023-08-10 10:10", "first time", FREY)
-    end: str = _("2023-08-10 16:50", "last time", FREY)
+    start: Moment = _("2023-08-10 10:10", "first time", FREY)
+    end: Moment = _("2023-08-10 16:50", "last time", FREY)
     step_min: Positive = _(10.0, "minutes between times")
     timezone: str = _("UTC", "IANA zone of start and end")
 
@@ -250,7 +262,7 @@ class Registration(Section):
     fit: bool = _(False, "fit them on a part of the records and report on the rest")
     origin_m: tuple[float, float, float] = _((0.0, 0.0, 0.0), "origin, or first guess of it")
     max_shift_m: NotNegative = _(0.4, "largest shift that is tried, east and north")
-    max_clock_offset_s: NotNegative = _(180.0, "largest clock offset that is tried")
+    max_clock_offset_s: NotNegative = _(360.0, "largest clock offset that is tried")
     split: Literal["sensor", "time"] = _(
         "sensor", "what is divided into fitting and reporting parts"
     )
@@ -281,7 +293,7 @@ class Figures(Section):
     """Pictures."""
 
     sensors: tuple[str, ...] = _((), "sensors of the daily courses; empty: six spread ones")
-    map_times: tuple[str, ...] = _((), "times of the ground maps; empty: four spread ones")
+    map_times: tuple[Moment, ...] = _((), "times of the ground maps; empty: four spread ones")
     map_spacing_m: Positive = _(0.25, "pixel of the ground maps")
     map_margin_m: NotNegative = _(2.0, "ground shown beyond the crown")
 
@@ -343,63 +355,6 @@ def validate(config: dict[str, Any], where: str = "configuration") -> Settings:
     try:
         settings = Settings.model_validate(config)
     except ValidationError as error:
-        raise _explain(error, where) from None
-    _check_consistency(settings, where)
+        raise config_checks.explain(error, Settings, where) from None
+    config_checks.check(settings, where)
     return settings
-
-
-def _explain(error: ValidationError, where: str) -> InputError:
-    """The first complaint of pydantic in our own terms."""
-    first = error.errors()[0]
-    key = ".".join(str(part) for part in first["loc"])
-    if first["type"] == "extra_forbidden":
-        known = _keys_beside(first["loc"])
-        close = difflib.get_close_matches(str(first["loc"][-1]), known, n=1, cutoff=0.4)
-        hint = f"Did you mean `{close[0]}`?" if close else f"Known keys: {', '.join(known)}."
-        return InputError(where, f"unknown key `{key}`", "a key of config/README.md", hint)
-    return InputError(
-        where,
-        f"`{key}: {first['input']!r}`",
-        first["msg"].lower(),
-        "See config/README.md for the meaning and range of every key.",
-    )
-
-
-def _keys_beside(location: tuple[int | str, ...]) -> list[str]:
-    """The valid keys of the section in which the unknown key stands."""
-    section: type[BaseModel] = Settings
-    for part in location[:-1]:
-        section = section.model_fields[str(part)].annotation
-    return list(section.model_fields)
-
-
-def _check_consistency(settings: Settings, where: str) -> None:
-    """Values that are valid alone and wrong together."""
-    known = ["polygons", *(f"voxels_{size}" for size in settings.voxels.sizes_m)]
-    if settings.source == "virtual":
-        known.append("truth")
-    for name in settings.reconstructions:
-        if name not in known:
-            raise InputError(
-                where,
-                f"`reconstructions: {name}`",
-                f"one of {', '.join(known)} (source: {settings.source})",
-                "Voxel reconstructions are named after voxels.sizes_m; truth exists in virtual "
-                "worlds only.",
-            )
-    if settings.measured.kind == "virtual" and settings.source != "virtual":
-        raise InputError(
-            where,
-            "`measured.kind: virtual`",
-            "`table` or `none` where the source is not virtual",
-            "Give the records in measured.path or compute light without comparison.",
-        )
-    for name, spectrum in (("bark", settings.optics.bark), ("ground", settings.optics.ground)):
-        if len(spectrum.wavelength_nm) != len(spectrum.reflectance):
-            raise InputError(
-                where,
-                f"`optics.{name}` with {len(spectrum.wavelength_nm)} wavelengths and "
-                f"{len(spectrum.reflectance)} reflectances",
-                "as many of one as of the other",
-                "Complete the shorter list.",
-            )

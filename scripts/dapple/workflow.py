@@ -14,7 +14,6 @@ from dapple.errors import InputError
 SCRIPTS = Path(__file__).parent.parent
 
 
-@cache
 def code_of(script: Path) -> tuple[str, ...]:
     """List the modules of dapple that a script imports, directly or through others.
 
@@ -28,9 +27,16 @@ def code_of(script: Path) -> tuple[str, ...]:
                 found.add(module)
                 waiting.append(module)
     r_code = {beside for module in found for beside in module.parent.glob(f"{module.stem}*.R")}
-    return tuple(sorted(str(path) for path in found | r_code))
+    return tuple(sorted(_short(path) for path in found | r_code))
 
 
+def _short(path: Path) -> str:
+    """Relative where it can be: a folder that moves is not taken for other code."""
+    here = Path.cwd()
+    return str(path.relative_to(here) if path.is_relative_to(here) else path)
+
+
+@cache
 def _imports(source: Path) -> list[Path]:
     """The files behind the `dapple` imports of one Python file."""
     names: list[str] = []

@@ -5,17 +5,17 @@ import xarray as xr
 
 from dapple.light.phase import phase_function
 
-N_ANGLES, N_LAYERS, N_AZIMUTHS = 16, 200, 180
+N_ANGLES, N_AZIMUTHS, N_DOUBLINGS = 16, 180, 18
 
 
-def turbid_slab(leaf_area_index: float, distribution: str = "spherical") -> xr.Dataset:
-    """A voxel layer 20 m thick and so wide that its edges do not matter."""
+def turbid_slab(*leaf_area_index: float, distribution: str = "spherical") -> xr.Dataset:
+    """Voxel layers 20 m thick, from below, and so wide that their edges do not matter."""
     size_m, n = 20.0, 400
     across = (np.arange(n) - (n - 1) / 2) * size_m
-    density = np.full((n, n, 1), leaf_area_index / size_m)
+    density = np.ones((n, n, 1)) * np.array(leaf_area_index) / size_m
     return xr.Dataset(
         {"plant_area_density_m2_m3": (("x", "y", "z"), density)},
-        coords={"x": across, "y": across, "z": [11.0]},
+        coords={"x": across, "y": across, "z": 11.0 + size_m * np.arange(len(leaf_area_index))},
         attrs={"voxel_size_m": size_m, "leaf_angle_distribution": distribution},
     )
 
@@ -23,51 +23,55 @@ def turbid_slab(leaf_area_index: float, distribution: str = "spherical") -> xr.D
 def transmitted_irradiance(
     leaf_area_index: float, reflectance: float, transmittance: float
 ) -> float:
-    """Irradiance below a layer under a sky of radiance 1 [pi: no layer], over black ground.
+    """Irradiance below a layer under a sky of radiance 1 [pi: no layer], over black ground."""
+    cosine, weight = _angles()
+    _, through = layer(leaf_area_index, reflectance, transmittance)
+    return float(2 * np.pi * (weight * cosine) @ through.sum(axis=1))
 
-    Source iteration with 16 Gauss angles in each hemisphere and 200 sublayers of constant source.
+
+def layer(
+    leaf_area_index: float, reflectance: float, transmittance: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Reflected and transmitted radiance per incoming one at 16 Gauss angles.
+
+    By doubling a layer so thin that light scatters in it once at most (van de Hulst 1963).
     """
+    cosine, weight = _angles()
+    depth = 0.5 * leaf_area_index / 2**N_DOUBLINGS / cosine[:, None]
+    back, ahead = (depth * part * weight for part in _azimuth_mean(reflectance, transmittance))
+    through = np.diag(np.exp(-depth[:, 0])) + ahead
+    one = np.eye(N_ANGLES)
+    for _ in range(N_DOUBLINGS):
+        between = np.linalg.solve(one - back @ back, through)
+        back, through = back + through @ back @ between, through @ between
+    return back, through
+
+
+def _angles() -> tuple[np.ndarray, np.ndarray]:
+    """Cosines of zenith angles in a hemisphere, and their weights."""
     node, weight = np.polynomial.legendre.leggauss(N_ANGLES)
-    cosine = np.concatenate([-(node + 1) / 2, (node + 1) / 2])  # down, then up
-    weight = np.concatenate([weight, weight]) / 2
-    kernel = _azimuth_mean(cosine, reflectance, transmittance)
-    step = leaf_area_index / N_LAYERS
-    decay = np.exp(-0.5 * step / np.abs(cosine))
-    radiance = np.zeros((N_LAYERS + 1, 2 * N_ANGLES))
-    source = np.zeros((N_LAYERS, 2 * N_ANGLES))
-    down, up = slice(0, N_ANGLES), slice(N_ANGLES, None)
-    for _ in range(400):
-        radiance[0, down], radiance[-1, up] = 1.0, 0.0
-        for layer in range(N_LAYERS):
-            radiance[layer + 1, down] = radiance[layer, down] * decay[down] + source[
-                layer, down
-            ] * (1 - decay[down])
-        for layer in range(N_LAYERS - 1, -1, -1):
-            radiance[layer, up] = radiance[layer + 1, up] * decay[up] + source[layer, up] * (
-                1 - decay[up]
-            )
-        middle = 0.5 * (radiance[1:] + radiance[:-1])
-        updated = (middle * weight) @ kernel
-        if np.abs(updated - source).max() < 1e-8:
-            break
-        source = updated
-    return float(2 * np.pi * (radiance[-1, down] * weight[down] * -cosine[down]).sum())
+    return (node + 1) / 2, weight / 2
 
 
-def _azimuth_mean(cosine: np.ndarray, reflectance: float, transmittance: float) -> np.ndarray:
-    """Source per radiance between all pairs of angles, the azimuth integrated out.
+def _azimuth_mean(reflectance: float, transmittance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Source per radiance between all pairs of angles, back and ahead, the azimuth integrated out.
 
     The phase function integrates to one over the sphere; the albedo is what leaves scatter.
     """
+    cosine, _ = _angles()
     sine = np.sqrt(1 - cosine**2)
     azimuth = (np.arange(N_AZIMUTHS) + 0.5) * 2 * np.pi / N_AZIMUTHS
-    angle = np.arccos(
-        np.clip(
-            cosine[:, None, None] * cosine[None, :, None]
-            + sine[:, None, None] * sine[None, :, None] * np.cos(azimuth),
-            -1,
-            1,
-        )
+    along = cosine[:, None, None] * cosine[:, None]
+    across = sine[:, None, None] * sine[:, None] * np.cos(azimuth)
+    albedo = reflectance + transmittance
+    if not albedo:
+        return np.zeros((N_ANGLES, N_ANGLES)), np.zeros((N_ANGLES, N_ANGLES))
+    back, ahead = (
+        phase_function(
+            np.arccos(np.clip(across + sign * along, -1, 1)),
+            np.array(reflectance),
+            np.array(transmittance),
+        ).mean(axis=-1)
+        for sign in (-1, 1)
     )
-    density = phase_function(angle, np.array(reflectance), np.array(transmittance))
-    return 2 * np.pi * density.mean(axis=-1) * (reflectance + transmittance)
+    return 2 * np.pi * albedo * back, 2 * np.pi * albedo * ahead

@@ -119,7 +119,7 @@ def test_the_answer_does_not_depend_on_how_rays_are_dealt_to_kernels(monkeypatch
     assert (sun_visibility(scene, points, way, n_disc=8, seed=8) == whole).all()
 
 
-def test_leaf_angles_that_are_not_spherical_are_refused():
-    scene = Scene(voxels=voxels(np.ones((1, 1, 1)), leaf_angle_distribution="planophile"))
-    with pytest.raises(InputError, match="planophile"):
+def test_leaf_angles_that_are_not_known_are_refused():
+    scene = Scene(voxels=voxels(np.ones((1, 1, 1)), leaf_angle_distribution="wavy"))
+    with pytest.raises(InputError, match="wavy"):
         sky_visibility(scene, np.zeros((1, 3)), n=4, seed=9)

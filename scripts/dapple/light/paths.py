@@ -15,8 +15,8 @@ from dapple.light.traced import TracedScene
 
 PLASTIC_STEPS = (3242174889, 2447445414)
 """2³² over the plastic number and over its square: steps of the R2 sequence (Roberts 2018)."""
-PATHS_PER_KERNEL = 1 << 17
-"""Bounds memory: a path takes about 150 bytes."""
+PATHS_PER_KERNEL = 1 << 19
+"""Bounds memory, a path takes about 150 bytes, and keeps the state of the paths in the cache."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,14 @@ def _trace_block(scene, points, start, number, seed, max_orders, halved_after, r
     centre = mi.Point3f(*(dr.gather(mi.Float, axis, start) for axis in points))
     origin = centre + radius * mi.Vector3f(on_disc.x, on_disc.y, 0)
     direction, escaped, alive, weight, *orders = _follow(
-        mi, scene, origin, mi.Vector3f(first), rng, dr.full(mi.Bool, True, n), max_orders, halved_after
+        mi,
+        scene,
+        origin,
+        mi.Vector3f(first),
+        rng,
+        dr.full(mi.Bool, True, n),
+        max_orders,
+        halved_after,
     )
     kept = dr.compress(escaped | alive)
     packed = orders[0] | orders[1] << 8 | orders[2] << 16 | orders[3] << 24

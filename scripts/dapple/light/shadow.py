@@ -4,21 +4,88 @@ Meshes block; turbid voxels transmit exp(-G * integral of plant area density), m
 from voxel to voxel. Made for many points and times, as in fitting a tree to records of its shade.
 """
 
-from types import ModuleType
+from collections.abc import Callable, Iterator
 
 import drjit as dr
 import numpy as np
 
-from dapple import engine
-from dapple.light import patterns
-from dapple.light.mitsuba_plugins import register
-from dapple.light.mitsuba_scene import SPHERICAL_G, mesh_shapes
-from dapple.light.scene import Scene, turbid_grid
+from dapple.light import patterns, traced
+from dapple.light.scene import Scene
+from dapple.light.traced import TracedScene
 
-RAYS_PER_KERNEL = 4_000_000
+RAYS_PER_KERNEL = 1 << 22
 """Bounds memory: a ray takes about 100 bytes."""
 
-BLACK = {"type": "rgb", "value": [0.0, 0.0, 0.0]}
+SunRays = Callable[[np.ndarray, int, int, int], tuple[np.ndarray, np.ndarray]]
+
+
+def sun_rays(
+    scene: TracedScene,
+    points_m: np.ndarray,
+    sun_directions: np.ndarray,
+    *,
+    sun_diameter_deg: float,
+    aperture_m: float,
+    seed: int,
+) -> SunRays:
+    """Prepare rays from level entrances to the sun's disc.
+
+    Parameters
+    ----------
+    scene : TracedScene
+        The ground does not matter.
+    points_m : (n, 3) float64
+        Local frame [m].
+    sun_directions : (t, 3) float64
+        Unit vectors towards the middle of the sun.
+    sun_diameter_deg : float
+        Angular diameter of the disc [deg].
+    aperture_m : float
+        Diameter of the level entrance around each point; 0 is a point [m].
+    seed : int
+        Shifts the pattern differently for each pair of point and sun and each replicate.
+
+    Returns
+    -------
+    callable
+        Of pairs (m,) (point * t + sun), a number of replicates r, the first ray's number and the
+        number of rays in a replicate. It returns the sums (m, r) of what the rays see, 0 to 1
+        each, nothing below the horizon, and the sums of squares (m,).
+    """
+    mi = scene.mi
+    points, axes = (_columns(mi, vectors) for vectors in (points_m, sun_directions))
+    radius = dr.opaque(mi.Float, float(np.sin(np.radians(0.5 * sun_diameter_deg))))
+    half_aperture = dr.opaque(mi.Float, 0.5 * aperture_m)
+    n_suns, key = dr.opaque(mi.UInt32, len(sun_directions)), dr.opaque(mi.UInt32, seed)
+    dimensions = 4 if aperture_m else 2
+
+    def block(pairs, pattern, n_replicates: int, n_rays: int):
+        ray, item = _rays_of_block(mi, len(pairs), n_replicates * n_rays)
+        pair = dr.gather(mi.UInt32, mi.UInt32(pairs.astype(np.uint32)), item)
+        per_set, sets = dr.opaque(mi.UInt32, n_rays), dr.opaque(mi.UInt32, n_replicates)
+        u = _shifted(mi, pattern, ray % per_set, pair * sets + ray // per_set, key)
+        point, sun = pair // n_suns, pair % n_suns
+        axis = mi.Vector3f(*(dr.gather(mi.Float, a, sun) for a in axes))
+        start = mi.Point3f(*(dr.gather(mi.Float, a, point) for a in points))
+        x, y = _disc(u[0], u[1])
+        way = dr.normalize(mi.Frame3f(axis).to_world(mi.Vector3f(radius * x, radius * y, 1.0)))
+        if aperture_m:
+            x, y = _disc(u[2], u[3])
+            start += half_aperture * mi.Vector3f(x, y, 0.0)
+        seen = scene.transmittance(start, way, (way.z > 0) & (axis.z > 0))
+        sums, squares = (dr.block_sum(x, n_rays) for x in (seen, seen * seen))
+        dr.eval(sums, squares)
+        return (np.array(x, np.float64).reshape(-1, n_replicates) for x in (sums, squares))
+
+    def trace(pairs: np.ndarray, n_replicates: int, first: int, n_rays: int):
+        pattern = _columns(mi, patterns.kronecker(first + n_rays, dimensions)[first:])
+        sums, squares = np.empty((len(pairs), n_replicates)), np.empty(len(pairs))
+        for part in _blocks(len(pairs), n_replicates * n_rays):
+            sums[part], square = block(pairs[part], pattern, n_replicates, n_rays)
+            squares[part] = square.sum(axis=1)
+        return sums, squares
+
+    return trace
 
 
 class Tracer:
@@ -33,20 +100,7 @@ class Tracer:
     """
 
     def __init__(self, scene: Scene, variant: str = "llvm_ad_rgb"):
-        self.variant = variant
-        self.mi = mi = engine.load(variant)
-        register()
-        names = ("leaf_reflectance", "leaf_transmittance", "bark_reflectance")
-        shapes = mesh_shapes(mi, scene.meshes, dict.fromkeys(names, BLACK))
-        self.scene = mi.load_dict({"type": "scene", **shapes}) if shapes else None
-        grid = turbid_grid(scene.voxels)
-        self.grid = None
-        if grid is not None:
-            density = grid.plant_area_density_m2_m3
-            self.shape = density.shape
-            self.low = mi.Point3f(*(dr.opaque(mi.Float, float(v)) for v in grid.low_m))
-            self.size = dr.opaque(mi.Float, grid.voxel_size_m)
-            self.grid = mi.Float((SPHERICAL_G * density).astype(np.float32).ravel())
+        self.scene = traced.load(scene, variant)
 
     def sun_visibility(
         self,
@@ -80,29 +134,17 @@ class Tracer:
         (n, m) float32
             0 (shade) to 1 (full sun); with turbid voxels the mean transmittance.
         """
-        mi = engine.load(self.variant)
-        points = _vectors(mi.Point3f, points_m)
-        pattern = mi.Float(patterns.kronecker(n_disc, 4).astype(np.float32).ravel())
-        across, along, axis = (
-            _vectors(mi.Vector3f, part) for part in _frames(np.asarray(sun_directions, float))
+        shape = len(points_m), len(sun_directions)
+        trace = sun_rays(
+            self.scene,
+            points_m,
+            sun_directions,
+            sun_diameter_deg=angular_diameter_deg,
+            aperture_m=aperture_m,
+            seed=seed,
         )
-        radius = dr.opaque(mi.Float, float(np.sin(np.radians(0.5 * angular_diameter_deg))))
-        entrance = dr.opaque(mi.Float, 0.5 * aperture_m)
-        n_points, n_suns = len(points_m), len(sun_directions)
-        suns = dr.opaque(mi.UInt32, n_suns)
-        visible = np.empty(n_points * n_suns, dtype=np.float32)
-        for low, high in _blocks(n_points * n_suns, n_disc):
-            ray, pair = _rays_of_block(mi, low, high - low, n_disc)
-            u = _shifted(mi, pattern, ray, pair, seed)
-            point, sun = pair // suns, pair % suns
-            x, y = _disc(u[0], u[1])
-            way = dr.gather(mi.Vector3f, across, sun) * x + dr.gather(mi.Vector3f, along, sun) * y
-            way = dr.normalize(dr.gather(mi.Vector3f, axis, sun) + radius * way)
-            x, y = _disc(u[2], u[3])
-            start = dr.gather(mi.Point3f, points, point) + entrance * mi.Vector3f(x, y, 0.0)
-            seen = self.transmittance(start, way, way.z > 0.0)
-            visible[low:high] = np.array(dr.block_sum(seen, n_disc)) / n_disc
-        return visible.reshape(n_points, n_suns)
+        seen = trace(np.arange(shape[0] * shape[1]), 1, 0, n_disc)[0] / n_disc
+        return seen.reshape(shape).astype(np.float32)
 
     def sky_visibility(self, points_m: np.ndarray, *, n: int, seed: int) -> np.ndarray:
         """Cosine-weighted share of the sky that each point sees: diffuse light below over above.
@@ -120,66 +162,20 @@ class Tracer:
         (p,) float32
             1 in the open.
         """
-        mi = engine.load(self.variant)
-        points = _vectors(mi.Point3f, points_m)
-        pattern = mi.Float(patterns.kronecker(n, 4).astype(np.float32).ravel())
+        mi = self.scene.mi
+        points = _columns(mi, points_m)
+        pattern = _columns(mi, patterns.kronecker(n, 2))
+        key = dr.opaque(mi.UInt32, seed)
         visible = np.empty(len(points_m), dtype=np.float32)
-        for low, high in _blocks(len(points_m), n):
-            ray, point = _rays_of_block(mi, low, high - low, n)
-            u = _shifted(mi, pattern, ray, point, seed)
-            x, y = _disc(u[0], u[1])
+        for part in _blocks(len(points_m), n):
+            ray, item = _rays_of_block(mi, part.stop - part.start, n)
+            point = item + dr.opaque(mi.UInt32, part.start)
+            x, y = _disc(*_shifted(mi, pattern, ray, point, key))
             way = mi.Vector3f(x, y, dr.sqrt(dr.maximum(1.0 - x * x - y * y, 0.0)))
-            start = dr.gather(mi.Point3f, points, point)
-            seen = self.transmittance(start, way, way.z > 0.0)
-            visible[low:high] = np.array(dr.block_sum(seen, n)) / n
+            start = mi.Point3f(*(dr.gather(mi.Float, a, point) for a in points))
+            seen = self.scene.transmittance(start, way, way.z > 0.0)
+            visible[part] = np.array(dr.block_sum(seen, n)) / n
         return visible
-
-    def transmittance(self, start, way, active):
-        """Share of light that a ray lets through; 0 where it is not active."""
-        mi = self.mi
-        if self.scene is not None:
-            active &= ~self.scene.ray_test(mi.Ray3f(start, way), active)
-        if self.grid is None:
-            return dr.select(active, mi.Float(1.0), 0.0)
-        depth = _march(mi, self.grid, self.shape, (start - self.low) / self.size, way, active)
-        return dr.select(active, dr.exp(-depth * self.size), 0.0)
-
-
-def _march(mi: ModuleType, grid, shape: tuple[int, int, int], start, way, active):
-    """Integral of the grid along rays in units of voxels (Amanatides and Woo 1987)."""
-    bound = mi.Point3f(*map(float, shape))
-    last = mi.Point3i(*(n - 1 for n in shape))
-    # an axis that a ray does not move along never limits it
-    safe = dr.select(dr.abs(way) > 1e-9, way, dr.copysign(mi.Vector3f(1e-9), way))
-    inverse = dr.rcp(safe)
-    to_low, to_high = -start * inverse, (bound - start) * inverse
-    enter = dr.maximum(dr.max(dr.minimum(to_low, to_high)), 0.0)
-    leave = dr.min(dr.maximum(to_low, to_high))
-    cell = dr.clip(mi.Point3i(dr.floor(start + enter * safe)), mi.Point3i(0), last)
-    forward = mi.Vector3i(dr.select(safe > 0.0, mi.Vector3i(1), mi.Vector3i(-1)))
-    ahead = mi.Vector3f(cell) + dr.select(safe > 0.0, mi.Vector3f(1.0), mi.Vector3f(0.0))
-    following = (ahead - start) * inverse
-    stride = dr.abs(inverse)
-    depth, t = mi.Float(0.0), mi.Float(enter)
-
-    def more(t, depth, cell, following, active):
-        return active
-
-    def step(t, depth, cell, following, active):
-        until = dr.minimum(dr.min(following), leave)
-        index = (cell.x * shape[1] + cell.y) * shape[2] + cell.z
-        depth += dr.gather(mi.Float, grid, mi.UInt32(index), active) * dr.maximum(until - t, 0.0)
-        along_x = (following.x <= following.y) & (following.x <= following.z)
-        along_y = ~along_x & (following.y <= following.z)
-        moved = dr.mask_t(mi.Vector3f)(along_x, along_y, ~along_x & ~along_y)
-        cell = mi.Point3i(cell + dr.select(moved, forward, 0))
-        following = following + dr.select(moved, stride, 0.0)
-        active &= until < leave
-        active &= dr.all((cell >= 0) & (cell <= last))
-        return dr.maximum(until, t), depth, cell, following, active
-
-    state = (t, depth, cell, following, active & (enter < leave))
-    return dr.while_loop(state, more, step)[1]
 
 
 def sun_visibility(
@@ -211,30 +207,34 @@ def sky_visibility(
     return Tracer(scene, variant).sky_visibility(points_m, n=n, seed=seed)
 
 
-def _vectors(kind, values: np.ndarray):
-    """(n, 3) numbers as Dr.Jit points or vectors."""
-    return kind(np.ascontiguousarray(np.asarray(values).T, dtype=np.float32))
+def _columns(mi, values: np.ndarray) -> list:
+    """The columns of (n, k) numbers as Dr.Jit arrays."""
+    return [mi.Float(np.ascontiguousarray(v, np.float32)) for v in np.asarray(values, float).T]
 
 
-def _blocks(n_items: int, rays_per_item: int):
+def _blocks(n_items: int, rays_per_item: int) -> Iterator[slice]:
     """Ranges of items whose rays fit one kernel."""
     step = max(1, RAYS_PER_KERNEL // rays_per_item)
     for low in range(0, n_items, step):
-        yield low, min(low + step, n_items)
+        yield slice(low, min(low + step, n_items))
 
 
-def _rays_of_block(mi: ModuleType, low: int, n_items: int, per_item: int):
-    """Index of each ray within its item's pattern, and the number of the item."""
+def _rays_of_block(mi, n_items: int, per_item: int):
+    """Number of each ray within its item, and the number of the item in the block."""
     index = dr.arange(mi.UInt32, n_items * per_item)
-    return index % per_item, index // per_item + dr.opaque(mi.UInt32, low)
+    rays = dr.opaque(mi.UInt32, per_item)
+    return index % rays, index // rays
 
 
-def _shifted(mi: ModuleType, pattern, ray, item, seed: int) -> list:
+def _shifted(mi, pattern: list, ray, item, key) -> list:
     """Pattern points with a shift that belongs to the item, whatever the block it falls in."""
-    first, second = mi.sample_tea_32(item, dr.opaque(mi.UInt32, seed))
-    third, fourth = mi.sample_tea_32(first, second)
-    shifts = [mi.Float(word) * 2.0**-32 for word in (first, second, third, fourth)]
-    points = [dr.gather(mi.Float, pattern, ray * 4 + k) + shifts[k] for k in range(4)]
+    words = mi.sample_tea_32(item, key)
+    if len(pattern) > 2:
+        words = (*words, *mi.sample_tea_32(*words))
+    points = [
+        dr.gather(mi.Float, column, ray) + mi.Float(word) * 2.0**-32
+        for column, word in zip(pattern, words, strict=True)
+    ]
     return [point - dr.floor(point) for point in points]
 
 
@@ -243,11 +243,3 @@ def _disc(u, v):
     sine, cosine = dr.sincos(dr.two_pi * v)
     radius = dr.sqrt(u)
     return radius * cosine, radius * sine
-
-
-def _frames(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Two directions across each unit vector (m, 3), at right angles, and the vector itself."""
-    helper = np.where(np.abs(axis[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
-    across = np.cross(axis, helper)
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    return across, np.cross(axis, across), axis

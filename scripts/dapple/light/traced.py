@@ -3,6 +3,7 @@
 from types import ModuleType
 
 import drjit as dr
+import mitsuba
 import numpy as np
 
 from dapple import engine
@@ -21,8 +22,8 @@ class TracedScene:
 
     Attributes
     ----------
-    mi : module
-        Mitsuba, its variant set.
+    variant : str
+        Of Mitsuba.
     meshes : mitsuba.Scene or None
         Leaf and wood.
     leaf : mitsuba shape pointer
@@ -36,8 +37,9 @@ class TracedScene:
         The ground plan that is repeated sideways without end.
     """
 
-    def __init__(self, mi: ModuleType, meshes, leaf, grid, box_m, ground_z_m: float, cell_m):
-        self.mi, self.meshes, self.leaf, self.grid = mi, meshes, leaf, grid
+    def __init__(self, variant: str, meshes, leaf, grid, box_m, ground_z_m: float, cell_m):
+        self.variant, self.meshes, self.leaf, self.grid = variant, meshes, leaf, grid
+        mi = self.mi
         extent = max(LEAST_EXTENT_M, float(np.abs(box_m).max()))
         # Opaque numbers stay out of the kernel's code: one kernel serves all scenes.
         self.ground_z, self.top_z, self.ray_offset = (
@@ -48,6 +50,13 @@ class TracedScene:
             self.cell = tuple(
                 mi.Point2f(*(dr.opaque(mi.Float, float(x)) for x in corner)) for corner in cell_m
             )
+
+    @property
+    def mi(self) -> ModuleType:
+        """Mitsuba in the variant of the scene, whatever was used in between."""
+        if mitsuba.variant() != self.variant:
+            engine.load(self.variant)
+        return mitsuba
 
     @dr.syntax
     def segment(self, origin, direction, rng, active):
@@ -159,7 +168,7 @@ class TracedScene:
 
 def load(
     scene: Scene,
-    variant: str = "llvm_ad_mono",
+    variant: str = "llvm_ad_rgb",
     *,
     places_m: np.ndarray | None = None,
     cell_m: np.ndarray | None = None,
@@ -214,7 +223,7 @@ def load(
         leaf = mi.ShapePtr(shapes["leaf"]) if "leaf" in shapes else leaf
     boxes.append(np.full((2, 3), scene.ground_z_m))
     box = np.array([np.min(boxes, axis=(0, 1)), np.max(boxes, axis=(0, 1))])
-    return TracedScene(mi, loaded, leaf, grid, box, scene.ground_z_m, cell)
+    return TracedScene(variant, loaded, leaf, grid, box, scene.ground_z_m, cell)
 
 
 def _check_cell(grid, cell: np.ndarray | None) -> None:

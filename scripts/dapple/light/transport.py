@@ -356,7 +356,10 @@ def _by_kind(transport: Transport, radiance: np.ndarray, scattered: bool):
             mine, own_kind = np.unique(kind[part], return_inverse=True)
             row = transport.replicate[rows].astype(np.int64) * len(mine) + own_kind
             counted = sparse.csr_array(
-                (transport.count[rows] * (np.pi / transport.n_paths[sensor]), (row, transport.patch[rows])),
+                (
+                    transport.count[rows] * (np.pi / transport.n_paths[sensor]),
+                    (row, transport.patch[rows]),
+                ),
                 shape=(n_replicates * len(mine), transport.n_patches),
             )
             yield sensor, mine, (counted @ by_patch).reshape(n_replicates, len(mine), -1)

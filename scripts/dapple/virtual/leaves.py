@@ -9,7 +9,6 @@ from dapple.streams import stream_seed
 from dapple.virtual import leaf_shapes
 from dapple.virtual.plant_skeleton import unit
 
-_BATCH = 512  # shoots drawn at a time
 _HEXAGON_FORM = 1.5 * np.sqrt(3)  # area of a regular hexagon per squared radius
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -24,9 +23,9 @@ def along_wood(
     crown_base_m: float = 2.1,
     height_m: float = 6.6,
     max_distance_m: float = 0.3,
-    clump_radius_m: float = 0.06,
+    clump_radius_m: float = 0.04,
     thin_wood_m2: float = 0.001,
-    leaves_per_shoot: int = 64,
+    leaves_per_shoot: int = 128,
     leaf_angle_distribution: str = "spherical",
     seed: int,
 ) -> Mesh:
@@ -49,7 +48,7 @@ def along_wood(
     voxel_size_m : float
         Edge of these voxels, laid from the local origin [m].
     crown_base_m : float
-        No polygon's centre lower than this above the lowest point of the wood [m].
+        No polygon's voxel lower than this above the lowest point of the wood [m].
     height_m : float
         None higher than this above that point [m].
     max_distance_m : float
@@ -80,7 +79,11 @@ def along_wood(
 
     Notes
     -----
-    Defaults: what Frey et al. (2025) found for the leaves of an apple tree.
+    Areas and counts by default: what Frey et al. (2025) found for the leaves of an apple tree.
+    The distances by default are a compromise on that tree's wood: they give a crown projection
+    of 44 m² (published 44.8) and about 7,950 voxels of 0.2 m with leaves (6,960). Denser shoots come
+    closer to the second and leave outer wood bare. The published 108 voxels of 1 m are out of
+    reach: the wood in the crown alone lies in 156, but about 100 of them hold 95 % of the polygons.
     """
     if not wood.n_elements:
         raise EmptyCloudError(
@@ -111,25 +114,25 @@ def along_wood(
     )
 
 
-def occupancy(leaves: Mesh, crown: tuple[float, ...] = (0.05, 0.2, 1.0)) -> dict:
+def occupancy(leaves: Mesh, sizes_m: tuple[float, ...] = (0.05, 0.2, 1.0)) -> dict:
     """How a placement fills space, to hold against a scan's figures.
 
     Parameters
     ----------
     leaves : Mesh
         Leaf polygons.
-    crown : tuple of float
+    sizes_m : tuple of float
         Voxel sizes to count with [m].
 
     Returns
     -------
     dict
-        `n_voxels_{size}` with the centre of a polygon in them, `crown_projection_m2` (convex
-        hull), `height_above_m` lowest and highest corner [m].
+        `n_voxels_{size}` that hold the centre of a polygon, `crown_projection_m2` (convex hull)
+        [m²], `lowest_z_m` and `highest_z_m` of the corners [m].
     """
     centre_m = element_centres(leaves)
     facts = {
-        f"n_voxels_{size:g}": len(np.unique(np.floor(centre_m / size), axis=0)) for size in crown
+        f"n_voxels_{size:g}": len(np.unique(np.floor(centre_m / size), axis=0)) for size in sizes_m
     }
     z_m = leaves.vertices_m[:, 2]
     return facts | {
@@ -153,6 +156,7 @@ def _positions(wood, n, voxel_m, between_m, max_distance_m, clump_m, thin_m2, n_
     nearest = cKDTree(centre_m)
     vigour = 1 / (1 + (area_m2 / thin_m2) ** 2)
     lowest_m, highest_m = between_m
+    half_depth_m = 0.5 * (highest_m - lowest_m - voxel_m)
     vigour[centre_m[:, 2] < lowest_m - max_distance_m] = 0
     if not vigour.any():
         raise InputError(
@@ -160,14 +164,16 @@ def _positions(wood, n, voxel_m, between_m, max_distance_m, clump_m, thin_m2, n_
             "Lower the crown base.",
         )  # fmt: skip
     vigour /= vigour.sum()
-    middle = vigour @ centre_m
+    middle = (vigour[:, None] * centre_m).sum(axis=0)
     first_m = np.empty((0, 3))
     n_near = np.empty(0, np.int64)
     without_news = 0
+    n_shoots = int(np.clip(n // n_tries, 16, 512))  # at a time
     while len(first_m) < n:
-        foot = centre_m[rng.choice(len(centre_m), _BATCH, p=vigour)]
+        foot = centre_m[rng.choice(len(centre_m), n_shoots, p=vigour)]
         drawn = _on_shoots(foot, middle, max_distance_m, clump_m, n_tries, rng)
-        drawn = drawn[(drawn[:, 2] > lowest_m) & (drawn[:, 2] < highest_m)]
+        voxel_z_m = voxel_m * (np.floor(drawn[:, 2] / voxel_m) + 0.5)
+        drawn = drawn[np.abs(voxel_z_m - 0.5 * (lowest_m + highest_m)) <= half_depth_m]
         drawn = drawn[np.isfinite(nearest.query(drawn, distance_upper_bound=max_distance_m)[0])]
         before = len(first_m)
         first_m, n_near = _add(first_m, n_near, drawn, voxel_m)

@@ -1,0 +1,106 @@
+"""What tests of the whole workflow share: a copy of the project to run, edit and break."""
+
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PARTS = ("Snakefile", "rules", "scripts", "config", "profiles", "envs", "docs")
+SMALL = "config/virtual-apple-small.yaml"
+
+
+@dataclass
+class Project:
+    """A copy of the project in a folder of its own, with its results."""
+
+    folder: Path
+    configfile: str = SMALL
+    overrides: tuple[str, ...] = ()
+    experiment: str = field(default="virtual-apple-small")
+
+    def snakemake(self, *arguments, cores=2, config=()):
+        """Run Snakemake to its end and return the finished process, its output as text."""
+        command = [sys.executable, "-m", "snakemake", "--cores", str(cores), "--nocolor"]
+        command += ["--configfile", self.configfile, *map(str, arguments)]
+        if overrides := (*self.overrides, *config):
+            command += ["--config", *overrides]
+        environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+        return subprocess.run(
+            command,
+            cwd=self.folder,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+
+    def run(self, *arguments, **settings):
+        """Run Snakemake, which has to succeed."""
+        done = self.snakemake(*arguments, **settings)
+        assert done.returncode == 0, f"{done.args}\n{done.stdout[-8000:]}"
+        return done.stdout
+
+    def planned(self, *arguments, **settings):
+        """The rules that a run would run, from a dry run."""
+        lines = self.run("--dry-run", "--quiet", "rules", *arguments, **settings)
+        return jobs(lines)
+
+    def result(self, path):
+        """The path of a result of this experiment."""
+        return self.folder / "results" / self.experiment / path
+
+    def clone(self, folder):
+        """The same project with the same results in another folder, to be edited."""
+        # Times and metadata go along: Snakemake finds nothing to do in the copy.
+        shutil.copytree(self.folder, folder, symlinks=True, copy_function=shutil.copy2)
+        return Project(folder, self.configfile, self.overrides, self.experiment)
+
+
+def jobs(output):
+    """Rule names from the job table of Snakemake, without `all`."""
+    lines = iter(output.splitlines())
+    for line in lines:
+        if line.split() == ["job", "count"]:
+            next(lines)
+            break
+    names = set()
+    for line in lines:
+        words = line.split()
+        if len(words) != 2 or words[0] == "total":
+            break
+        names.add(words[0])
+    return names - {"all"}
+
+
+def copy_of_project(folder, configfile=SMALL, overrides=(), experiment="virtual-apple-small"):
+    """The project as it stands here, without results, in a folder of its own."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for part in PARTS:
+        source = ROOT / part
+        if source.is_dir():
+            shutil.copytree(source, folder / part, copy_function=shutil.copy2)
+        else:
+            shutil.copy2(source, folder / part)
+    if (ROOT / ".tools").is_dir():
+        (folder / ".tools").symlink_to(ROOT / ".tools")
+    return Project(folder, configfile, tuple(overrides), experiment)
+
+
+@pytest.fixture(scope="session")
+def small_run(tmp_path_factory):
+    """The whole chain in a small virtual world, run once for all tests; not to be edited."""
+    project = copy_of_project(tmp_path_factory.mktemp("small") / "dapple")
+    project.run()
+    return project
+
+
+@pytest.fixture
+def project(tmp_path):
+    """A copy of the project without results, to be edited and broken."""
+    return copy_of_project(tmp_path / "dapple")

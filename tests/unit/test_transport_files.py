@@ -1,0 +1,56 @@
+"""What was traced survives being written."""
+
+import numpy as np
+import pytest
+
+from dapple.errors import InputError
+from dapple.formats import transport as files
+from dapple.light.direct import Sunlit
+from dapple.light.transport import Transport
+
+
+def traced(rows=50):
+    rng = np.random.default_rng(1)
+    return Transport(
+        sensor=np.sort(rng.integers(3, size=rows).astype(np.int32)),
+        replicate=rng.integers(16, size=rows).astype(np.int32),
+        patch=rng.integers(577, size=rows).astype(np.int32),
+        orders=rng.integers(255, size=(rows, 4)).astype(np.uint8),
+        count=rng.integers(1, 2**40, size=rows),
+        n_paths=np.array([64, 128, 64]),
+        cut=np.array([0, 3, 1]),
+        n_replicates=16,
+        n_patches=577,
+        max_orders=250,
+    )
+
+
+@pytest.mark.parametrize("rows", [0, 50])
+def test_counted_paths_come_back_as_they_were(tmp_path, rows):
+    before = traced(rows)
+    files.write(tmp_path / "paths.nc", before)
+    after = files.read(tmp_path / "paths.nc")
+    for name, value in vars(before).items():
+        np.testing.assert_array_equal(getattr(after, name), value)
+        assert np.asarray(getattr(after, name)).dtype == np.asarray(value).dtype
+
+
+def test_the_same_paths_give_the_same_bytes(tmp_path):
+    for name in ("a.nc", "b.nc"):
+        files.write(tmp_path / name, traced())
+    assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
+
+
+def test_what_sensors_see_of_the_sun_comes_back_as_it_was(tmp_path):
+    rng = np.random.default_rng(1)
+    before = Sunlit(rng.random((8, 3, 5)), rng.random((3, 5)), rng.integers(99, size=(3, 5)))
+    files.write_sunlit(tmp_path / "sun.nc", before)
+    after = files.read_sunlit(tmp_path / "sun.nc")
+    for name, value in vars(before).items():
+        np.testing.assert_array_equal(getattr(after, name), value)
+
+
+def test_a_file_of_another_kind_is_named(tmp_path):
+    files.write_sunlit(tmp_path / "sun.nc", Sunlit(np.ones((1, 1, 1)), *np.ones((2, 1, 1))))
+    with pytest.raises(InputError, match=r"sun\.nc.*no sensor"):
+        files.read(tmp_path / "sun.nc")

@@ -1,0 +1,82 @@
+"""What rules and scripts share: the code that a rule depends on, logs, errors that read well."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from dapple.errors import InputError
+from dapple.workflow import SCRIPTS, code_of, options, run
+
+
+def modules(script):
+    """Names of the modules that a script is made of, below dapple."""
+    folder = f"{SCRIPTS.name}/dapple/"
+    return {path[path.index(folder) + len(folder) :] for path in code_of(SCRIPTS / f"{script}.py")}
+
+
+def test_a_script_is_made_of_what_it_imports_itself_and_through_others():
+    code = modules("polygons")
+    assert "structure/polygons.py" in code  # by the script
+    assert "structure/hulls.py" in code  # by structure/polygons.py
+    assert "errors.py" in code
+
+
+@pytest.mark.parametrize("script", ["plant", "scan", "clean", "classify", "sky", "optics"])
+def test_the_code_of_polygons_is_no_part_of_what_comes_before_or_beside_them(script):
+    assert "structure/polygons.py" not in modules(script)
+
+
+@pytest.mark.parametrize("script", ["plant", "scan", "polygons", "voxels", "timesteps"])
+def test_the_typed_configuration_is_no_part_of_any_step(script):
+    assert "config.py" not in modules(script)
+
+
+def test_r_code_counts_as_well():
+    assert "stats/correlation.R" in modules("statistics")
+
+
+def test_every_script_is_made_of_something():
+    scripts = [path.stem for path in SCRIPTS.glob("*.py")]
+    assert len(scripts) > 20
+    for script in scripts:
+        assert "workflow.py" in modules(script), script
+
+
+def test_code_is_named_relative_to_where_the_workflow_runs(monkeypatch):
+    monkeypatch.chdir(SCRIPTS.parent)
+    assert all(path.startswith("scripts/dapple/") for path in code_of(SCRIPTS / "scan.py"))
+
+
+@pytest.fixture
+def job(tmp_path):
+    return SimpleNamespace(log=[str(tmp_path / "rule.log")], written=tmp_path / "rule.log")
+
+
+def test_what_a_script_prints_goes_to_its_log(job, capsys):
+    run(lambda _: print("12 points"), job)
+    assert job.written.read_text() == "12 points\n"
+    assert capsys.readouterr().out == ""
+
+
+def test_a_mistake_of_the_user_s_ends_the_job_with_one_message(job):
+    def main(_):
+        raise InputError("tree.laz", "no points", "a scan", "Check the export.")
+
+    with pytest.raises(SystemExit) as stop:
+        run(main, job)
+    message = "dapple: tree.laz: found no points; expected a scan. Check the export."
+    assert stop.value.code == message  # text: printed as it is, and the exit status is 1
+    assert job.written.read_text().endswith(f"\n{message}\n")
+    assert "Traceback" in job.written.read_text()
+
+
+def test_any_other_error_ends_the_job_with_a_traceback_in_the_log_too(job):
+    with pytest.raises(ZeroDivisionError):
+        run(lambda _: 1 / 0, job)
+    assert "ZeroDivisionError" in job.written.read_text()
+
+
+def test_named_parameters_become_keyword_arguments():
+    assert options(SimpleNamespace(items=lambda: [("voxel_size_m", 0.05)])) == {
+        "voxel_size_m": 0.05
+    }

@@ -1,0 +1,198 @@
+"""The whole chain in a small virtual world: what it leaves behind, and what an edit reruns."""
+
+import json
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+import yaml
+
+from dapple.config import validate
+
+RECONSTRUCTIONS = ["polygons", "voxels_0.2", "voxels_1.0", "truth"]
+N_SENSORS, N_TIMES = 6, 6
+LIGHT = ("par", "par_direct", "par_sky", "par_scattered", "standard_error")
+COLUMNS = {
+    "statistics/overall.csv": "reconstruction n r r_low r_high rmse bias mae baseline_r",
+    "statistics/per_sensor.csv": "reconstruction sensor n r rmse bias",
+    "runtime.csv": "step reconstruction wall_s cpu_s peak_rss_mb",
+}
+CHEAP = [
+    "structure/truth/leaves_0.ply",
+    "structure/truth/wood.ply",
+    "scan/points.laz",
+    "scan/shots.parquet",
+    "clean/cloud.laz",
+    "clean/clean.json",
+    "classes/cloud.laz",
+    "classes/scores.json",
+    "structure/polygons/leaves_0.ply",
+    "structure/polygons/wood.ply",
+    "structure/polygons/summary.json",
+    "structure/voxels_0.2/voxels.nc",
+    "structure/voxels_0.2/voxels.vox",
+    "structure/voxels_0.2/summary.json",
+]
+BEFORE_STRUCTURE = {"plant", "scan", "clean", "classify"}
+AFTER_LIGHT = {"records", "statistics", "comparison_figures", "series_figure", "runtime", "page"}
+
+
+# What it leaves behind
+
+
+@pytest.mark.parametrize("path", sorted(COLUMNS))
+def test_tables_have_the_columns_that_others_rely_on(small_run, path):
+    table = pd.read_csv(small_run.result(path))
+    expected = COLUMNS[path].split()
+    assert list(table.columns)[: len(expected)] == expected
+    assert len(table)
+
+
+@pytest.mark.parametrize("name", RECONSTRUCTIONS)
+def test_light_of_every_reconstruction_covers_all_sensors_and_times(small_run, name):
+    with xr.open_dataset(small_run.result(f"light/{name}.nc")) as light:
+        light.load()
+    assert dict(light.sizes) == {"sensor": N_SENSORS, "time": N_TIMES}
+    for part in LIGHT:
+        values = light[f"{part}_umol_m2_s"]
+        assert values.dims == ("sensor", "time")
+        assert values.attrs["units"]
+        assert values.attrs["long_name"]
+        assert np.isfinite(values).all()
+        assert (values >= 0).all()
+    parts = sum(light[f"par_{part}_umol_m2_s"] for part in ("direct", "sky", "scattered"))
+    np.testing.assert_allclose(parts, light["par_umol_m2_s"], rtol=1e-5)
+
+
+@pytest.mark.parametrize("name", RECONSTRUCTIONS)
+def test_every_timestep_is_a_file_of_its_own(small_run, name):
+    files = sorted(small_run.result(f"light/timesteps/{name}").glob("*.nc"))
+    assert len(files) == N_TIMES
+    assert files[0].name == "20230810T103000Z.nc"
+
+
+@pytest.mark.parametrize("name", RECONSTRUCTIONS)
+def test_summaries_tell_areas_beside_the_true_one(small_run, name):
+    facts = json.loads(small_run.result(f"structure/{name}/summary.json").read_text())
+    assert {"leaf_area_m2", "wood_area_m2", "n_elements", "volume_m3"} <= facts.keys()
+    assert facts["true_leaf_area_m2"] == pytest.approx(5.0, rel=0.01)
+    assert 0 < facts["leaf_area_m2"] < 4 * facts["true_leaf_area_m2"]
+
+
+def test_leaf_and_wood_are_scored_against_the_truth(small_run):
+    scores = json.loads(small_run.result("classes/scores.json").read_text())["scores"]
+    flat = json.dumps(scores).lower()
+    assert all(word in flat for word in ("precision", "recall", "f1", "kappa"))
+
+
+def test_the_truth_agrees_with_records_made_from_it_and_no_reconstruction_beats_it(small_run):
+    overall = pd.read_csv(small_run.result("statistics/overall.csv"), index_col="reconstruction")
+    assert list(overall.index) == RECONSTRUCTIONS
+    assert overall.loc["truth", "r"] > 0.99
+    assert overall["r"].idxmax() == "truth"
+    assert (overall["n"] == N_SENSORS * N_TIMES).all()
+    # A tree that stands in the light explains more of it than a sky without one.
+    assert (overall["r"] > overall["baseline_r"]).all()
+
+
+def test_every_job_leaves_a_log_and_a_benchmark(small_run):
+    logs = {path.stem for path in small_run.result("logs").glob("*.log")}
+    benchmarks = {path.stem for path in small_run.result("benchmarks").glob("*.tsv")}
+    assert logs == benchmarks
+    assert {"scan", "voxels_0.2", "timesteps_truth", "page"} <= logs
+    steps = set(pd.read_csv(small_run.result("runtime.csv"))["step"])
+    assert {"scan", "voxels", "timesteps", "statistics"} <= steps
+
+
+def test_the_merged_configuration_stands_beside_the_results(small_run):
+    written = yaml.safe_load(small_run.result("config.yaml").read_text())
+    asked = yaml.safe_load((small_run.folder / small_run.configfile).read_text())
+    assert written["plant"]["height_m"] == asked["plant"]["height_m"]
+    settings = validate(written)
+    assert settings.model_dump(mode="json") == written
+
+
+def test_the_page_needs_no_other_file_and_no_network(small_run):
+    page = small_run.result("report.html").read_text()
+    sources = re.findall(r"""(?:src|href)\s*=\s*["']?([^"'\s>]+)|url\(([^)]+)\)""", page)
+    assert len(sources) == 5  # the figures
+    assert all(source.startswith("data:image/png;base64,") for source, _ in sources)
+    assert "http" not in re.sub(r"base64,[A-Za-z0-9+/=]+", "", page)
+
+
+def test_no_half_written_file_is_left(small_run):
+    assert not list(small_run.result("").rglob(".partial-*"))
+
+
+# What is run again
+
+
+def test_a_second_run_has_nothing_to_do(small_run):
+    assert small_run.planned() == set()
+
+
+def test_a_run_in_a_folder_that_moved_has_nothing_to_do(small_run, tmp_path):
+    assert small_run.clone(tmp_path / "moved").planned() == set()
+
+
+@pytest.mark.parametrize(
+    ("edit", "again", "untouched"),
+    [
+        (
+            "polygons={voxel_size_m: 0.06}",
+            {"configuration", "polygons", "cloud_to_mesh", "timesteps", "light", *AFTER_LIGHT},
+            {*BEFORE_STRUCTURE, "voxels", "sky", "optics"},
+        ),
+        (
+            "voxels={estimator: ppl}",
+            {"configuration", "voxels", "timesteps", "light", *AFTER_LIGHT},
+            {*BEFORE_STRUCTURE, "polygons", "sensors", "sky", "optics", "ground_map"},
+        ),
+        (
+            "radiation={linke_turbidity: 4}",
+            {"configuration", "sky", "timesteps", "light", "ground_map", *AFTER_LIGHT},
+            {*BEFORE_STRUCTURE, "polygons", "voxels", "sensors", "optics", "tree_figure"},
+        ),
+        (
+            "statistics={confidence: 0.9}",
+            {"configuration", "statistics", "comparison_figures", "runtime", "page"},
+            {*BEFORE_STRUCTURE, "polygons", "voxels", "sky", "timesteps", "light", "records"},
+        ),
+    ],
+)
+def test_an_edited_parameter_reruns_what_depends_on_it_and_nothing_else(
+    small_run, edit, again, untouched
+):
+    planned = small_run.planned(config=[edit])
+    assert again <= planned
+    assert not untouched & planned
+
+
+def test_a_parameter_of_voxels_reruns_the_light_in_voxels_alone(small_run):
+    output = small_run.run("--dry-run", config=["voxels={estimator: ppl}"])
+    lit = set(re.findall(r"wildcards: reconstruction=(\S+)", output))
+    assert lit == {"voxels_0.2", "voxels_1.0"}
+
+
+def test_an_edit_of_the_code_of_polygons_reruns_polygons_and_not_the_scan(small_run, tmp_path):
+    project = small_run.clone(tmp_path / "edited")
+    with (project.folder / "scripts/dapple/structure/polygons.py").open("a") as code:
+        code.write("\n# edited\n")
+    planned = project.planned()
+    assert {"polygons", "timesteps", "light", "page"} <= planned
+    assert not {*BEFORE_STRUCTURE, "voxels", "sky"} & planned
+
+
+# The same bytes
+
+
+def test_one_core_makes_the_bytes_that_two_cores_make(small_run, project):
+    project.run(*(f"results/{project.experiment}/{path}" for path in CHEAP), cores=1)
+    different = [
+        path
+        for path in CHEAP
+        if project.result(path).read_bytes() != small_run.result(path).read_bytes()
+    ]
+    assert not different
