@@ -39,8 +39,8 @@ def leaves(n_triangles: int, seed: int = 1) -> Mesh:
 
 
 def stem() -> Mesh:
-    """A square stem to the middle of the crown."""
-    corners = np.array([(-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)])
+    """A square stem to the middle of the crown, with no sensor in it."""
+    corners = np.array([(0.2, 0.2), (0.4, 0.2), (0.4, 0.4), (0.2, 0.4)])
     vertices = np.concatenate([np.c_[corners, np.zeros(4)], np.c_[corners, np.full(4, 4.0)]])
     sides = [((k, (k + 1) % 4, (k + 1) % 4 + 4), (k, (k + 1) % 4 + 4, k + 4)) for k in range(4)]
     faces = np.array(sides, np.int32).reshape(-1, 3)

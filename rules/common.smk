@@ -8,7 +8,7 @@ Makes   results/{experiment}/config.yaml     the merged configuration of this ru
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(workflow.basedir) / "scripts"))
+sys.path.append(str(Path(workflow.basedir) / "scripts"))
 
 from dapple import workflow as dapple_workflow
 from dapple.config import validate

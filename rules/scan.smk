@@ -154,6 +154,11 @@ if settings.source == "cloud":
         params:
             shots=settings.cloud.shots,
             scan_frame=settings.scan_frame.model_dump(),
+            required=(
+                ["Reflectance"]
+                if settings.classify.method in ("reflectance", "mixture")
+                else []
+            ),
         message:
             "{settings.experiment}: read {input.cloud}"
         script:

@@ -96,16 +96,10 @@ rule voxels:
     input:
         shots=results("scan/shots.parquet"),
         classes=results("classes/cloud.laz"),
-        truth=(
-            results("structure/truth/summary.json")
-            if settings.source == "virtual"
-            else []
-        ),
         code=code("voxels"),
     output:
         voxels=results("structure/voxels_{size}/voxels.nc"),
         amapvox=results("structure/voxels_{size}/voxels.vox"),
-        summary=results("structure/voxels_{size}/summary.json"),
     log:
         logs("voxels_{size}"),
     benchmark:
@@ -138,3 +132,30 @@ rule export:
         ),
     message:
         "{settings.experiment}: OBJ for LESS and DART"
+
+
+rule voxels_summary:
+    input:
+        voxels=results("structure/voxels_{size}/voxels.nc"),
+        wood=results("structure/polygons/wood.ply") if LIT else [],
+        truth=(
+            results("structure/truth/summary.json")
+            if settings.source == "virtual"
+            else []
+        ),
+        code=code("voxels_summary"),
+    output:
+        summary=results("structure/voxels_{size}/summary.json"),
+    log:
+        logs("voxels_summary_{size}"),
+    benchmark:
+        benchmarks("voxels_summary_{size}")
+    conda:
+        "../envs/dapple.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    message:
+        "{settings.experiment}: areas in {wildcards.size} m voxels"
+    script:
+        "../scripts/voxels_summary.py"

@@ -5,7 +5,6 @@ import pandas as pd
 from dapple.cloud.ingest import shots_from_scan
 from dapple.cloud.lattice import ScanFrame
 from dapple.cloud.ordered import shots_from_ptx
-from dapple.cloud.lattice import ScanFrame
 from dapple.formats import clouds, shots
 from dapple.frames import to_local
 from dapple.workflow import run
@@ -14,6 +13,8 @@ from dapple.workflow import run
 def main(snakemake):
     params, path = snakemake.params, snakemake.input.cloud
     cloud = clouds.read(path)
+    for attribute in params.required:
+        clouds.require(cloud, attribute, path)
     print(f"{path}: {len(cloud)} points, origin {cloud.origin_m.tolist()}")
     clouds.write(snakemake.output.points, cloud)
     match params.shots:

@@ -1,9 +1,9 @@
 """Areas of real wood and of the virtual leaves placed along it."""
 
 import numpy as np
-from dapple.structure.summary import of_meshes
 
 from dapple.formats import json, meshes
+from dapple.structure.summary import of_meshes
 from dapple.workflow import run
 
 

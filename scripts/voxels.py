@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from dapple.formats import clouds, json, shots, voxels
-from dapple.structure import summary
+from dapple.formats import clouds, shots, voxels
 from dapple.structure.returns import kinds_by_place
 from dapple.structure.voxels import Grid, plant_area_density
 from dapple.workflow import options, run
@@ -22,10 +21,8 @@ def main(snakemake):
     density = plant_area_density(
         shots.iterate(snakemake.input.shots), grid, kinds=kinds, **settings
     )
-    truth = json.read(snakemake.input.truth) if snakemake.input.truth else None
     voxels.write(snakemake.output.voxels, density)
     voxels.write_vox(snakemake.output.amapvox, density)
-    json.write(snakemake.output.summary, summary.of_voxels(density, truth=truth))
 
 
 if __name__ == "__main__":

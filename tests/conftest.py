@@ -25,8 +25,8 @@ class Project:
 
     def snakemake(self, *arguments, cores=2, config=()):
         """Run Snakemake to its end and return the finished process, its output as text."""
-        command = [sys.executable, "-m", "snakemake", "--cores", str(cores), "--nocolor"]
-        command += ["--configfile", self.configfile, *map(str, arguments)]
+        command = [sys.executable, "-m", "snakemake", *map(str, arguments)]
+        command += ["--cores", str(cores), "--nocolor", "--configfile", self.configfile]
         if overrides := (*self.overrides, *config):
             command += ["--config", *overrides]
         environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}

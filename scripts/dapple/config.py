@@ -147,6 +147,9 @@ class Polygons(Section):
 
     voxel_size_m: Positive = _(0.05, "edge of the voxels", FREY)
     buffer_m: NotNegative = _(round(sqrt(2 * 0.01**2) / 2, 6), "outward growth of each hull", FREY)
+    mitre_limit: Annotated[float, Ge(1), Le(10)] = _(
+        1.414, "corners move outwards by at most so many buffers"
+    )
 
 
 class Voxels(Section):
@@ -160,6 +163,12 @@ class Voxels(Section):
     single_leaf_area_m2: NotNegative = _(0.0, "finite-element correction; 0: none")
     max_pad_m2_m3: Positive = _(5.0, "cap of plant area density", "AMAPVox")
     min_shots: Count = _(5, "fewer shots leave a voxel unknown", "AMAPVox")
+    contact_voxel_m: NotNegative = _(
+        0.05, "sub-voxels of the contact frequency; 0: none", "Hosoi and Omasa 2006"
+    )
+    beam_divergence_mrad: NotNegative = _(0.0, "weight shots by their beam's section; 0: equally")
+    beam_diameter_m: NotNegative = _(0.0, "beam's diameter at the scanner, for that weight")
+    allow_missing_misses: bool = _(False, "go on where every shot of a scan has a return")
 
 
 class Site(Section):

@@ -83,7 +83,7 @@ def test_a_key_like_no_other_is_answered_with_those_that_exist():
 
 
 def test_an_unknown_key_is_told_before_a_wrong_value():
-    with pytest.raises(InputError, match="unknown key `plant.hight_m`"):
+    with pytest.raises(InputError, match=r"unknown key `plant\.hight_m`"):
         validate({"seed": -1, "plant": {"hight_m": 3.0}})
 
 

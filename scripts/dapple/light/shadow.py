@@ -10,6 +10,7 @@ import drjit as dr
 import numpy as np
 
 from dapple.light import patterns, traced
+from dapple.light.patches import Patches, patches
 from dapple.light.scene import Scene
 from dapple.light.traced import TracedScene
 
@@ -17,6 +18,7 @@ RAYS_PER_KERNEL = 1 << 22
 """Bounds memory: a ray takes about 100 bytes."""
 
 SunRays = Callable[[np.ndarray, int, int, int], tuple[np.ndarray, np.ndarray]]
+SkyRays = Callable[[np.ndarray, int, int, int], np.ndarray]
 
 
 def sun_rays(
@@ -88,6 +90,65 @@ def sun_rays(
     return trace
 
 
+def sky_rays(scene: TracedScene, points_m: np.ndarray, sky: Patches, *, seed: int) -> SkyRays:
+    """Prepare rays from points to the patches of the sky.
+
+    Parameters
+    ----------
+    scene : TracedScene
+        The ground does not matter.
+    points_m : (n, 3) float64
+        Local frame [m].
+    sky : Patches
+        Subdivision of the sky into p patches.
+    seed : int
+        Shifts the pattern differently for each point, replicate and patch.
+
+    Returns
+    -------
+    callable
+        Of points (m,), a number of replicates r, the first ray's number and the number of rays in
+        a patch and replicate. It returns the sums (m, r, p) of what the rays see, 0 to 1 each;
+        rays are evenly spread over a patch's projected solid angle.
+    """
+    mi = scene.mi
+    points = _columns(mi, points_m)
+    width = 2 * np.pi / np.repeat(sky.row_count, sky.row_count)
+    start = (np.arange(sky.n) - np.repeat(sky.row_start, sky.row_count) - 0.5) * width
+    low, high = (
+        np.repeat(bound**2, sky.row_count) for bound in (sky.row_sine[:-1], sky.row_sine[1:])
+    )
+    # Within a patch the squared sine of the altitude and the azimuth are even.
+    table = _columns(mi, np.stack([low, high - low, start, width], axis=1))
+    n_patches, key = dr.opaque(mi.UInt32, sky.n), dr.opaque(mi.UInt32, seed)
+
+    def block(items, point, pattern, n_rays: int):
+        ray, number = _rays_of_block(mi, len(items), n_rays)
+        item = dr.gather(mi.UInt32, mi.UInt32(items.astype(np.uint32)), number)
+        u = _shifted(mi, pattern, ray, item, key)
+        low, height, start, width = (
+            dr.gather(mi.Float, column, item % n_patches) for column in table
+        )
+        squared = dr.fma(u[0], height, low)
+        east, north = dr.sincos(dr.fma(u[1], width, start))
+        level = dr.safe_sqrt(1 - squared)
+        way = mi.Vector3f(level * east, level * north, dr.sqrt(squared))
+        point = dr.gather(mi.UInt32, mi.UInt32(point.astype(np.uint32)), number)
+        origin = mi.Point3f(*(dr.gather(mi.Float, a, point) for a in points))
+        return np.array(dr.block_sum(scene.transmittance(origin, way, way.z > 0), n_rays))
+
+    def trace(chosen: np.ndarray, n_replicates: int, first: int, n_rays: int):
+        pattern = _columns(mi, patterns.kronecker(first + n_rays, 2)[first:])
+        per_point = n_replicates * sky.n
+        items = (chosen[:, None] * per_point + np.arange(per_point)).ravel()
+        sums = np.empty(len(items), np.float32)
+        for part in _blocks(len(items), n_rays):
+            sums[part] = block(items[part], items[part] // per_point, pattern, n_rays)
+        return sums.reshape(len(chosen), n_replicates, sky.n)
+
+    return trace
+
+
 class Tracer:
     """Shadow rays through one scene, whose acceleration structure is built once.
 
@@ -103,6 +164,70 @@ class Tracer:
         self.scene = traced.load(scene, variant)
 
     def sun_visibility(
+        self,
+        points_m: np.ndarray,
+        sun_directions: np.ndarray,
+        *,
+        n_disc: int,
+        seed: int,
+        angular_diameter_deg: float = 0.53,
+        aperture_m: float = 0.0,
+    ) -> np.ndarray:
+        """Share of the sun's disc that each point sees in each direction of the sun.
+
+        Parameters
+        ----------
+        points_m : (n, 3) array
+            Local frame [m].
+        sun_directions : (m, 3) array
+            Unit vectors towards the middle of the sun; below the horizon nothing is seen.
+        n_disc : int
+            Rays per point and direction, evenly spread over the disc.
+        seed : int
+            Turns the pattern differently for each point and direction.
+        angular_diameter_deg : float
+            Of the sun [deg].
+        aperture_m : float
+            Diameter of the level entrance around each point [m]; 0 is a point.
+
+        Returns
+        -------
+        (n, m) float32
+            0 (shade) to 1 (full sun); with turbid voxels the mean transmittance.
+        """
+        shape = len(points_m), len(sun_directions)
+        trace = sun_rays(
+            self.scene,
+            points_m,
+            sun_directions,
+            sun_diameter_deg=angular_diameter_deg,
+            aperture_m=aperture_m,
+            seed=seed,
+        )
+        seen = trace(np.arange(shape[0] * shape[1]), 1, 0, n_disc)[0] / n_disc
+        return seen.reshape(shape).astype(np.float32)
+
+    def sky_visibility(self, points_m: np.ndarray, *, n: int, seed: int) -> np.ndarray:
+        """Cosine-weighted share of the sky that each point sees: diffuse light below over above.
+
+        Parameters
+        ----------
+        points_m : (p, 3) array
+            Local frame [m].
+        n : int
+            Rays per point, with a cosine law about the zenith.
+        seed : int
+
+        Returns
+        -------
+        (p,) float32
+            1 in the open.
+        """
+        trace = sky_rays(self.scene, points_m, patches(1), seed=seed)
+        return trace(np.arange(len(points_m)), 1, 0, n)[:, 0, 0] / np.float32(n)
+
+
+def sun_visibility(
         self,
         points_m: np.ndarray,
         sun_directions: np.ndarray,

@@ -81,9 +81,9 @@ def along_wood(
     -----
     Areas and counts by default: what Frey et al. (2025) found for the leaves of an apple tree.
     The distances by default are a compromise on that tree's wood: they give a crown projection
-    of 44 m² (published 44.8) and about 7,950 voxels of 0.2 m with leaves (6,960). Denser shoots come
-    closer to the second and leave outer wood bare. The published 108 voxels of 1 m are out of
-    reach: the wood in the crown alone lies in 156, but about 100 of them hold 95 % of the polygons.
+    of 44 m² (published 44.8) and about 7,950 voxels of 0.2 m with leaves (6,960). Denser shoots
+    come closer to the second and leave outer wood bare. The published 108 voxels of 1 m are out
+    of reach: the wood in the crown alone lies in 156, but about 100 hold 95 % of the polygons.
     """
     if not wood.n_elements:
         raise EmptyCloudError(

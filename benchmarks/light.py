@@ -1,0 +1,234 @@
+"""How fast is light? Transport against the per-timestep engine, on a synthetic apple tree.
+
+    PYTHONPATH=scripts python benchmarks/light.py [--kinds polygons voxels_0.2] [--folder DIR]
+
+For each kind of scene it prints, in one run: the time from files of geometry to a file of light in
+a fresh process (72 sensors, 306 minutes, 61 bands), its standard errors, the ratio of the
+per-timestep engine's time to it at equal standard error, how well both agree, and shadow rays a
+second as a share of a bare loop of Mitsuba's `ray_test` over the same rays.
+"""
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import drjit as dr
+import numpy as np
+import pandas as pd
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
+
+import crown
+
+from dapple.formats import light, meshes, scenes, voxels
+from dapple.frames import direction_from_angles
+from dapple.light import direct, patterns, series, shadow, traced, transport
+from dapple.light.reference import Reference
+from dapple.light.scene import Scene
+
+KINDS = ("polygons", "voxels_0.2", "voxels_1.0")
+DIRECT_TOLERANCE, PATH_TOLERANCE = 0.004, 0.003
+"""Standard errors as shares of the open sky; together they stay below 0.5 %."""
+SUN_DIAMETER_DEG = 0.533
+REFERENCE_RAYS = {
+    "replicates": 16,
+    "direct_rays": 64,
+    "sky_rays": 64,
+    "scattered_rays": 32,
+    "max_depth": 8,
+}
+
+
+def prepare(folder: Path, kind: str, n_triangles: int, n_sensors: int, n_times: int) -> None:
+    """Write the inputs of one run."""
+    scene = crown.scene(kind, n_triangles)
+    if scene.voxels is None:
+        meshes.write_ply(folder / "leaves.ply", scene.meshes["leaf"])
+    else:
+        voxels.write(folder / "leaves.nc", scene.voxels)
+    meshes.write_ply(folder / "wood.ply", scene.meshes["wood"])
+    light.write(folder / "sky.nc", described(crown.sky(n_times)))
+    light.write_optics(folder / "optics.nc", crown.optics())
+    np.save(folder / "sensors.npy", crown.sensors(n_sensors))
+
+
+def described(sky):
+    """A sky dataset whose variables all say what they are."""
+    for name in sky.data_vars:
+        sky[name].attrs.setdefault("units", "1")
+        sky[name].attrs.setdefault("long_name", name)
+    return sky
+
+
+def once(folder: Path, variant: str) -> dict[str, float]:
+    """From files of geometry to a file of light; returns seconds of each step and errors."""
+    clock = [time.perf_counter()]
+    leaves = folder / "leaves.ply"
+    leaves = leaves if leaves.exists() else folder / "leaves.nc"
+    scene = traced.load(scenes.read([leaves], folder / "wood.ply")[0], variant)
+    sky, optics = light.read(folder / "sky.nc"), light.read_optics(folder / "optics.nc")
+    sensors = np.load(folder / "sensors.npy")
+    clock.append(time.perf_counter())
+    sunlit = direct.sunlit(
+        scene,
+        sensors,
+        series.towards_sun(sky),
+        tolerance=DIRECT_TOLERANCE,
+        max_rays=1 << 15,
+        seed=1,
+        sun_diameter_deg=SUN_DIAMETER_DEG,
+    )
+    clock.append(time.perf_counter())
+    counted = transport.collect(
+        scene,
+        sensors,
+        n_paths=4096,
+        n_patches=577,
+        max_orders=30,
+        seed=2,
+        tolerance=PATH_TOLERANCE,
+        optics=crown.optics(4),
+    )
+    clock.append(time.perf_counter())
+    result = series.compute(sunlit, counted, sky, optics, sun_kernel_deg=8.0)
+    names = [f"1_{k}" for k in range(len(sensors))]
+    light.write(folder / "light.nc", series.summarise([result], names, sky))
+    clock.append(time.perf_counter())
+    share = result.standard_error / series.open_sky_par(sky).to_numpy()
+    steps = ("load", "direct", "paths", "bands_and_write")
+    return dict(zip(steps, np.diff(clock), strict=True)) | {
+        "shadow_rays": int(sunlit.n_rays.sum()) * len(sunlit.share),
+        "paths": int(counted.n_paths.sum()) * counted.n_replicates,
+        "truncated_share": float(counted.truncated_share(optics).max()),
+        "error_rms": float(np.sqrt((share**2).mean())),
+        "error_max": float(share.max()),
+        "peak_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        "cpu": time.process_time(),
+    }
+
+
+def fresh(folder: Path, variant: str) -> dict[str, float]:
+    """`once` in a process of its own, imports included in `wall`."""
+    begin = time.perf_counter()
+    command = [sys.executable, __file__, "--once", str(folder), "--variant", variant]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    wall = time.perf_counter() - begin
+    return json.loads(done.stdout.splitlines()[-1]) | {"wall": wall}
+
+
+def against_reference(folder: Path, scene: Scene, fast: dict, variant: str, n_compared: int):
+    """Time of the per-timestep engine at equal standard error, and how far both agree."""
+    sky, optics = light.read(folder / "sky.nc"), light.read_optics(folder / "optics.nc")
+    sensors = pd.DataFrame(np.load(folder / "sensors.npy"), columns=["x_m", "y_m", "z_m"])
+    sensors.insert(0, "sensor", [f"1_{k}" for k in range(len(sensors))])
+    reference = Reference(
+        [scene],
+        sky,
+        optics,
+        bands=3,
+        **REFERENCE_RAYS,
+        sun_diameter_deg=SUN_DIAMETER_DEG,
+        variant=variant,
+        seed=7,
+    )
+    chosen = np.linspace(0, sky.sizes["time"] - 1, n_compared).astype(int)
+    reference.at(chosen[0], sensors)  # builds the scene and compiles the kernels
+    begin = time.perf_counter()
+    found = [reference.at(index, sensors) for index in chosen]
+    seconds = (time.perf_counter() - begin) / n_compared
+    ours = light.read(folder / "light.nc").isel(time=chosen)
+    open_sky = series.open_sky_par(sky).to_numpy()[chosen]
+    par, error = (
+        np.concatenate([part[name].to_numpy() for part in found], axis=1)
+        for name in ("par_umol_m2_s", "standard_error_umol_m2_s")
+    )
+    mine = ours["standard_error_umol_m2_s"].to_numpy()
+    difference = ours["par_umol_m2_s"].to_numpy() - par
+    variance = ((error / open_sky) ** 2).mean()
+    z = difference / np.hypot(np.hypot(error, mine), 1e-6 * open_sky)
+    at_equal_error = seconds * sky.sizes["time"] * variance / fast["error_rms"] ** 2
+    return {
+        "reference_per_time": seconds,
+        "reference_error_rms": float(np.sqrt(variance)),
+        "reference_at_equal_error": float(at_equal_error),
+        "ratio": float(at_equal_error / fast["wall"]),
+        "rmse": float(np.sqrt(((difference / open_sky) ** 2).mean())),
+        "bias": float((difference / open_sky).mean()),
+        "max_abs_z": float(np.abs(z).max()),
+    }
+
+
+def shadow_rays(scene: Scene, variant: str, n_sensors: int = 72, n_times: int = 100) -> dict:
+    """Shadow rays a second of the engine, and of a bare loop over the same rays."""
+    loaded = traced.load(scene, variant)
+    mi = loaded.mi
+    sensors, sky = crown.sensors(n_sensors), crown.sky(n_times)
+    suns, n_rays = series.towards_sun(sky), 256
+    trace = shadow.sun_rays(
+        loaded, sensors, suns, sun_diameter_deg=SUN_DIAMETER_DEG, aperture_m=0.0, seed=1
+    )
+    pairs = np.arange(n_sensors * n_times)
+    rays = len(pairs) * n_rays
+    disc = patterns.disc(patterns.kronecker(n_rays, 2)) * np.sin(np.radians(SUN_DIAMETER_DEG / 2))
+    turn = np.stack([direction_from_angles(90.0, 90.0), direction_from_angles(90.0, 0.0)])
+    ways = suns[:, None] + disc @ turn
+    ways = np.broadcast_to(ways, (n_sensors, n_times, n_rays, 3)).reshape(-1, 3)
+    ways = mi.Vector3f(np.ascontiguousarray(ways.T, np.float32))
+    starts = np.repeat(sensors, n_times * n_rays, axis=0)
+    starts = mi.Point3f(np.ascontiguousarray(starts.T, np.float32))
+    dr.eval(ways, starts)
+
+    def bare():
+        dr.eval(loaded.meshes.ray_test(mi.Ray3f(starts, ways)))
+        dr.sync_thread()
+
+    times = {"engine": [], "bare": []}
+    for _ in range(6):
+        for name, run in (("engine", lambda: trace(pairs, 8, 0, n_rays // 8)), ("bare", bare)):
+            begin = time.perf_counter()
+            run()
+            times[name].append(time.perf_counter() - begin)
+    engine, loop = (rays / min(times[name][1:]) for name in ("engine", "bare"))
+    return {"rays_per_s": engine, "bare_rays_per_s": loop, "share_of_bare": engine / loop}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--kinds", nargs="+", default=KINDS)
+    parser.add_argument("--variant", default="llvm_ad_rgb")
+    parser.add_argument("--triangles", type=int, default=350_000)
+    parser.add_argument("--sensors", type=int, default=72)
+    parser.add_argument("--times", type=int, default=306)
+    parser.add_argument("--compared", type=int, default=6, help="times of the reference engine")
+    parser.add_argument("--folder", type=Path, help="for light.csv; default: none is written")
+    parser.add_argument("--once", type=Path, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.once:
+        print(json.dumps(once(options.once, options.variant)))
+        return
+    rows = {}
+    for kind in options.kinds:
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            prepare(folder, kind, options.triangles, options.sensors, options.times)
+            fresh(folder, options.variant)  # kernels are compiled once on a machine
+            row = fresh(folder, options.variant)
+            scene = crown.scene(kind, options.triangles)
+            row |= against_reference(folder, scene, row, options.variant, options.compared)
+        if kind == "polygons":
+            row |= shadow_rays(scene, options.variant)
+        rows[kind] = row
+    table = pd.DataFrame(rows)
+    print(table.to_string(float_format=lambda value: f"{value:.4g}"))
+    if options.folder:
+        options.folder.mkdir(parents=True, exist_ok=True)
+        table.T.rename_axis("kind").to_csv(options.folder / "light.csv")
+
+
+if __name__ == "__main__":
+    main()
