@@ -14,8 +14,10 @@ include: "rules/cloud.smk"
 include: "rules/structure.smk"
 include: "rules/sky.smk"
 include: "rules/light.smk"
+include: "rules/advice.smk"
 include: "rules/statistics.smk"
 include: "rules/figures.smk"
+include: "rules/survey.smk"
 
 
 rule all:

@@ -25,7 +25,10 @@ except InputError as error:
 PLACEMENTS = range(settings.leaves.placements if settings.source == "wood" else 1)
 VOXELS = [name for name in settings.reconstructions if name.startswith("voxels_")]
 LIT = settings.reconstructions if settings.sensors.kind != "none" else ()
-VARIANT = f"{settings.light.variant}_ad_rgb"
+VARIANT = f"{settings.light.variant}_ad"
+REFERENCE_TIMES = TIMES[
+    :: max(1, round(settings.light.timestep.step_min / settings.time.step_min))
+]
 ATMOSPHERE = {
     "precipitable_water_cm",
     "ozone_atm_cm",
@@ -38,7 +41,12 @@ SKY = {
     "atmosphere": {"model": settings.radiation.sky}
     | settings.radiation.model_dump(include=ATMOSPHERE),
 }
-ENGINE = settings.light.model_dump() | {"variant": VARIANT}
+REFERENCE = settings.light.timestep.model_dump(exclude={"step_min"}) | {
+    "sun_diameter_deg": settings.light.sun_diameter_deg,
+    "aperture_m": settings.light.aperture_m,
+    "variant": f"{VARIANT}_rgb",
+}
+CHECKED = LIT if settings.light.engine == "transport" and settings.light.check else ()
 COMPARED = LIT if settings.measured.kind != "none" else ()
 
 
@@ -110,14 +118,54 @@ def leaf_geometry(wildcards):
     return leaf_meshes(name)
 
 
+def placements(reconstruction):
+    """Numbers of the geometries whose mean is a reconstruction's light."""
+    return [0] if reconstruction.startswith("voxels_") else PLACEMENTS
+
+
+def transports(wildcards):
+    """The counted paths of all placements of a reconstruction."""
+    name = wildcards.reconstruction
+    return [results(f"light/transport/{name}_{p}.nc") for p in placements(name)]
+
+
 def wood_mesh(wildcards):
     """The wood that light meets: the truth's in the truth, else the polygons'."""
     meshed = "truth" if wildcards.reconstruction == "truth" else "polygons"
     return results(f"structure/{meshed}/wood.ply")
 
 
+def sized(section):
+    """Geometries of all sizes that a section asks for, with sensors and light, by name of input."""
+    polygons = section.polygon_sizes_m if settings.source != "wood" else ()
+    has_shots = settings.source != "cloud" or settings.cloud.shots != "none"
+    voxels = section.voxel_sizes_m if has_shots else ()
+    truth = ("leaves_0", "wood") if settings.source == "virtual" else ()
+    return {
+        "leaves": leaf_meshes("polygons")[0],
+        "wood": results("structure/polygons/wood.ply"),
+        "sized_leaves": [results(f"structure/polygons_{size}/leaves_0.ply") for size in polygons],
+        "sized_wood": [results(f"structure/polygons_{size}/wood.ply") for size in polygons],
+        "voxels": [results(f"structure/voxels_{size}/voxels.nc") for size in voxels],
+        "truth": [results(f"structure/truth/{kind}.ply") for kind in truth],
+        "sensors": results("sky/sensors.csv"),
+        "sky": results("sky/sky.nc"),
+        "optics": results("sky/optics.nc"),
+    }
+
+
+SURVEY_FILES = (
+    "shadowing.csv",
+    "regression.csv",
+    "profile.csv",
+    "plan.csv",
+)
+
+
 def targets():
     """What a plain run makes."""
+    if settings.survey.enabled:
+        return [results("config.yaml"), *(results(f"survey/{f}") for f in SURVEY_FILES)]
     wanted = ["config.yaml", "classes/scores.json"]
     wanted += [f"structure/{name}/summary.json" for name in settings.reconstructions]
     wanted += [f"structure/{name}/voxels.vox" for name in VOXELS]
@@ -126,6 +174,8 @@ def targets():
     if LIT:
         wanted += [f"light/{name}.nc" for name in LIT]
         wanted += ["figures/tree.png", "figures/ground_map.png", "figures/series.png"]
+    if CHECKED:
+        wanted += ["statistics/agreement.csv"]
     if COMPARED:
         wanted += ["statistics/overall.csv", "statistics/per_sensor.csv"]
         wanted += [

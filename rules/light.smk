@@ -3,8 +3,10 @@ Light: what arrives at the sensors.
 
 Needs   structure/{reconstruction}/, sky/sky.nc, sky/optics.nc, sky/sensors.csv
 Makes   registration/registration.json                  origin of the tree's frame, clock offset
-        light/timesteps/{reconstruction}/{time}.nc      one cached file a timestep
+        light/transport/{reconstruction}_{placement}.nc counted paths: any sky, spectrum and time
         light/{reconstruction}.nc                       the series of all times
+        light/timesteps/{reconstruction}/{time}.nc      the independent check, one cached file a timestep
+        light/reference/{reconstruction}.nc             its series
         light/ground_map.nc                             light on the ground at a few times
 """
 
@@ -35,7 +37,7 @@ rule registration:
     params:
         **dict(settings.registration),
         **(SKY if settings.registration.fit else {}),
-        variant=VARIANT,
+        variant=f"{VARIANT}_rgb",
         seed=stream("registration"),
     message:
         "{settings.experiment}: origin of the tree's frame and offset of the clock"
@@ -56,7 +58,7 @@ rule timesteps:
         times=update(
             expand(
                 results("light/timesteps/{reconstruction}/{time}.nc"),
-                time=TIMES,
+                time=REFERENCE_TIMES,
                 allow_missing=True,
             )
         ),
@@ -70,9 +72,10 @@ rule timesteps:
     resources:
         mem_mb=4000,
     params:
-        engine=ENGINE,
+        engine=REFERENCE,
         ground_z_m=settings.ground_z_m,
-        n_times=len(TIMES),
+        times=[TIMES.index(time) for time in REFERENCE_TIMES],
+        n_times=len(REFERENCE_TIMES),
         seed=stream("timesteps"),
     message:
         "{settings.experiment}: Mitsuba, {wildcards.reconstruction}, {params.n_times} times"
@@ -80,29 +83,99 @@ rule timesteps:
         "../scripts/timesteps.py"
 
 
-rule light:
+rule reference:
     input:
         times=expand(
             results("light/timesteps/{reconstruction}/{time}.nc"),
-            time=TIMES,
+            time=REFERENCE_TIMES,
             allow_missing=True,
         ),
-        code=code("light"),
+        code=code("reference"),
     output:
-        light=results("light/{reconstruction}.nc"),
+        light=(
+            results("light/{reconstruction}.nc")
+            if settings.light.engine == "timestep"
+            else results("light/reference/{reconstruction}.nc")
+        ),
     log:
-        logs("light_{reconstruction}"),
+        logs("reference_{reconstruction}"),
     benchmark:
-        benchmarks("light_{reconstruction}")
+        benchmarks("reference_{reconstruction}")
     conda:
         "../envs/dapple.yaml"
     threads: 1
     resources:
         mem_mb=1000,
     message:
-        "{settings.experiment}: light series, {wildcards.reconstruction}"
+        "{settings.experiment}: series of the timesteps, {wildcards.reconstruction}"
     script:
-        "../scripts/light.py"
+        "../scripts/reference.py"
+
+
+if settings.light.engine == "transport":
+
+    rule transport:
+        input:
+            leaves=lambda wildcards: leaf_geometry(wildcards)[int(wildcards.placement)],
+            wood=wood_mesh,
+            sensors=results("sky/sensors.csv"),
+            code=code("transport"),
+        output:
+            transport=results("light/transport/{reconstruction}_{placement}.nc"),
+        log:
+            logs("transport_{reconstruction}_{placement}"),
+        benchmark:
+            benchmarks("transport_{reconstruction}_{placement}")
+        conda:
+            "../envs/dapple.yaml"
+        threads: 2
+        resources:
+            mem_mb=4000,
+        params:
+            **settings.light.transport.model_dump(exclude={"max_shadow_rays"}),
+            aperture_m=settings.light.aperture_m,
+            ground_z_m=settings.ground_z_m,
+            variant=f"{VARIANT}_mono",
+            seed=lambda wildcards: stream("transport", wildcards.placement),
+        message:
+            "{settings.experiment}: trace paths, {wildcards.reconstruction} {wildcards.placement}"
+        script:
+            "../scripts/transport.py"
+
+    rule light:
+        input:
+            transports=transports,
+            leaves=leaf_geometry,
+            wood=wood_mesh,
+            sensors=results("sky/sensors.csv"),
+            sky=results("sky/sky.nc"),
+            optics=results("sky/optics.nc"),
+            code=code("light"),
+        output:
+            light=results("light/{reconstruction}.nc"),
+        log:
+            logs("light_{reconstruction}"),
+        benchmark:
+            benchmarks("light_{reconstruction}")
+        conda:
+            "../envs/dapple.yaml"
+        threads: 2
+        resources:
+            mem_mb=4000,
+        params:
+            tolerance=settings.light.transport.tolerance,
+            max_shadow_rays=settings.light.transport.max_shadow_rays,
+            sun_kernel_deg=settings.light.transport.sun_kernel_deg,
+            sun_diameter_deg=settings.light.sun_diameter_deg,
+            aperture_m=settings.light.aperture_m,
+            ground_z_m=settings.ground_z_m,
+            n_times=len(TIMES),
+            variant=f"{VARIANT}_mono",
+            seed=stream("light"),
+        message:
+            "{settings.experiment}: light series, {wildcards.reconstruction}, {params.n_times} times"
+        script:
+            "../scripts/light.py"
 
 
 rule ground_map:
@@ -127,7 +200,7 @@ rule ground_map:
         times=settings.figures.map_times,
         spacing_m=settings.figures.map_spacing_m,
         margin_m=settings.figures.map_margin_m,
-        engine=ENGINE,
+        engine=REFERENCE,
         ground_z_m=settings.ground_z_m,
         seed=stream("ground_map"),
     message:

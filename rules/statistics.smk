@@ -5,6 +5,7 @@ Needs   light/{reconstruction}.nc and the records, or the virtual truth
 Makes   statistics/records.csv        measured and simulated PAR side by side, fitting and reporting part named
         statistics/overall.csv        one line a reconstruction, reporting part only
         statistics/per_sensor.csv     one line a sensor
+        statistics/agreement.csv      transport engine against the per-timestep engine
         statistics/mixed_model.csv    measured on simulated light, sensor as random effect
         runtime.csv                   time and memory of every step
 """
@@ -69,6 +70,31 @@ rule statistics:
         "{settings.experiment}: correlation, error, bias"
     script:
         "../scripts/statistics.py"
+
+
+rule agreement:
+    input:
+        light=[results(f"light/{name}.nc") for name in CHECKED],
+        reference=[results(f"light/reference/{name}.nc") for name in CHECKED],
+        sky=results("sky/sky.nc"),
+        code=code("agreement"),
+    output:
+        agreement=results("statistics/agreement.csv"),
+    log:
+        logs("agreement"),
+    benchmark:
+        benchmarks("agreement")
+    conda:
+        "../envs/dapple.yaml"
+    threads: 1
+    resources:
+        mem_mb=500,
+    params:
+        reconstructions=CHECKED,
+    message:
+        "{settings.experiment}: transport engine against the per-timestep engine"
+    script:
+        "../scripts/agreement.py"
 
 
 rule runtime:

@@ -147,9 +147,9 @@ rule voxels_summary:
     output:
         summary=results("structure/voxels_{size}/summary.json"),
     log:
-        logs("voxels_summary_{size}"),
+        logs("summary_voxels_{size}"),
     benchmark:
-        benchmarks("voxels_summary_{size}")
+        benchmarks("summary_voxels_{size}")
     conda:
         "../envs/dapple.yaml"
     threads: 1

@@ -1,17 +1,34 @@
-"""Put the timesteps of one reconstruction together."""
+"""PAR through the day: direct beam traced now, sky and scattered light from counted paths."""
 
-import xarray as xr
-
-from dapple.formats import light
+from dapple.formats import light, scenes, transport
+from dapple.light import direct, sensors, series, traced
+from dapple.streams import stream_seed
 from dapple.workflow import run
 
 
 def main(snakemake):
-    times = [light.read(path) for path in snakemake.input.times]
-    series = xr.concat(
-        times, "time", data_vars="minimal", coords="minimal", combine_attrs="drop_conflicts"
-    )
-    light.write(snakemake.output.light, series)
+    params, inputs = snakemake.params, snakemake.input
+    sky, optics = light.read(inputs.sky), light.read_optics(inputs.optics)
+    table = sensors.read_local(inputs.sensors)
+    placements = []
+    for number, (leaves, counted) in enumerate(zip(inputs.leaves, inputs.transports, strict=True)):
+        scene = scenes.read([leaves], inputs.wood, params.ground_z_m)[0]
+        paths = transport.read(counted)
+        sunlit = direct.sunlit(
+            traced.load(scene, params.variant),
+            table[["x_m", "y_m", "z_m"]].to_numpy(),
+            series.towards_sun(sky),
+            tolerance=series.DIRECT_SHARE * params.tolerance,
+            max_rays=params.max_shadow_rays,
+            n_replicates=paths.n_replicates,
+            sun_diameter_deg=params.sun_diameter_deg,
+            aperture_m=params.aperture_m,
+            seed=stream_seed(params.seed, number),
+        )
+        placements.append(
+            series.compute(sunlit, paths, sky, optics, sun_kernel_deg=params.sun_kernel_deg)
+        )
+    light.write(snakemake.output.light, series.summarise(placements, list(table["sensor"]), sky))
 
 
 if __name__ == "__main__":

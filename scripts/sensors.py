@@ -23,7 +23,8 @@ def main(snakemake):
         )
     for path in inputs.leaves:
         geometry = {"leaf": meshes.read_ply(path), "wood": wood}
-        sensors.check(table, geometry, where=str(inputs.table or "sensors"))
+        where = str(inputs.table or "sensors")
+        sensors.check(table, geometry, ground_z_m=params.ground_z_m, where=where)
     with atomic(snakemake.output.sensors) as partial:
         table.to_csv(partial, index=False)
 

@@ -10,7 +10,7 @@ def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
     reference = Reference(
         scenes.read(inputs.leaves, inputs.wood, params.ground_z_m),
-        light.read(inputs.sky),
+        light.read(inputs.sky).isel(time=params.times),
         light.read_optics(inputs.optics),
         **params.engine,
         seed=params.seed,

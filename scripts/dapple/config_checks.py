@@ -83,7 +83,7 @@ def check(settings: Settings, where: str) -> None:
     where : str
         The files that they come from.
     """
-    for rule in (_reconstructions, _paths, _misses, _measured, _registration, _spectra):
+    for rule in (_reconstructions, _paths, _misses, _measured, _registration, _timesteps, _spectra):
         rule(settings, where)
     for section in ("site", "time", "radiation"):
         find_timezone(getattr(settings, section).timezone, f"{where}, `{section}.timezone`")
@@ -170,6 +170,19 @@ def _registration(settings: Settings, where: str) -> None:
             )
 
 
+def _timesteps(settings: Settings, where: str) -> None:
+    """Two engines are compared at times that both have."""
+    ratio = settings.light.timestep.step_min / settings.time.step_min
+    if ratio > 1 and abs(ratio - round(ratio)) > 1e-9:
+        raise InputError(
+            where,
+            f"`light.timestep.step_min: {settings.light.timestep.step_min}` and "
+            f"`time.step_min: {settings.time.step_min}`",
+            "the first a multiple of the second",
+            "Change one of the two.",
+        )
+
+
 def _spectra(settings: Settings, where: str) -> None:
     for name, spectrum in (("bark", settings.optics.bark), ("ground", settings.optics.ground)):
         if len(spectrum.wavelength_nm) != len(spectrum.reflectance):
@@ -180,3 +193,13 @@ def _spectra(settings: Settings, where: str) -> None:
                 "as many of one as of the other",
                 "Complete the shorter list.",
             )
+
+
+def _light(settings: Settings, where: str) -> None:
+    if settings.light.model == "advised" and settings.light.engine != "transport":
+        raise InputError(
+            where,
+            f"`light.model: advised` and `light.engine: {settings.light.engine}`",
+            "`light.engine: transport`, which the advice is about",
+            "Choose the transport engine or `light.model: full`.",
+        )

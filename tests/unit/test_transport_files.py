@@ -6,12 +6,13 @@ import pytest
 from dapple.errors import InputError
 from dapple.formats import transport as files
 from dapple.light.direct import Sunlit
-from dapple.light.transport import Transport
+from dapple.light.tensor import Transport
 
 
 def traced(rows=50):
     rng = np.random.default_rng(1)
     return Transport(
+        sky_seen=rng.random((3, 16, 577), np.float32),
         sensor=np.sort(rng.integers(3, size=rows).astype(np.int32)),
         replicate=rng.integers(16, size=rows).astype(np.int32),
         patch=rng.integers(577, size=rows).astype(np.int32),
@@ -19,8 +20,6 @@ def traced(rows=50):
         count=rng.integers(1, 2**40, size=rows),
         n_paths=np.array([64, 128, 64]),
         cut=np.array([0, 3, 1]),
-        n_replicates=16,
-        n_patches=577,
         max_orders=250,
     )
 

@@ -17,6 +17,7 @@ LIGHT = ("par", "par_direct", "par_sky", "par_scattered", "standard_error")
 COLUMNS = {
     "statistics/overall.csv": "reconstruction n r r_low r_high rmse bias mae baseline_r",
     "statistics/per_sensor.csv": "reconstruction sensor n r rmse bias",
+    "statistics/agreement.csv": "reconstruction n rmse_rel bias_rel max_abs_z",
     "runtime.csv": "step reconstruction wall_s cpu_s peak_rss_mb",
 }
 CHEAP = [
@@ -36,7 +37,8 @@ CHEAP = [
     "structure/voxels_0.2/summary.json",
 ]
 BEFORE_STRUCTURE = {"plant", "scan", "clean", "classify"}
-AFTER_LIGHT = {"records", "statistics", "comparison_figures", "series_figure", "runtime", "page"}
+REFERENCE = {"timesteps", "reference", "agreement"}
+COMPARISON = {"records", "statistics", "comparison_figures", "series_figure", "runtime", "page"}
 
 
 # What it leaves behind
@@ -97,13 +99,22 @@ def test_the_truth_agrees_with_records_made_from_it_and_no_reconstruction_beats_
     assert (overall["r"] > overall["baseline_r"]).all()
 
 
+@pytest.mark.parametrize("name", RECONSTRUCTIONS)
+def test_two_independent_engines_agree_on_the_light(small_run, name):
+    agreement = pd.read_csv(small_run.result("statistics/agreement.csv"), index_col=0)
+    row = agreement.loc[name]
+    assert row["n"] == N_SENSORS * N_TIMES
+    assert abs(row["bias_rel"]) < 0.02
+    assert row["max_abs_z"] < 6
+
+
 def test_every_job_leaves_a_log_and_a_benchmark(small_run):
     logs = {path.stem for path in small_run.result("logs").glob("*.log")}
     benchmarks = {path.stem for path in small_run.result("benchmarks").glob("*.tsv")}
     assert logs == benchmarks
-    assert {"scan", "voxels_0.2", "timesteps_truth", "page"} <= logs
+    assert {"scan", "voxels_0.2", "light_truth", "page"} <= logs
     steps = set(pd.read_csv(small_run.result("runtime.csv"))["step"])
-    assert {"scan", "voxels", "timesteps", "statistics"} <= steps
+    assert {"scan", "voxels", "light", "statistics"} <= steps
 
 
 def test_the_merged_configuration_stands_beside_the_results(small_run):
@@ -142,23 +153,28 @@ def test_a_run_in_a_folder_that_moved_has_nothing_to_do(small_run, tmp_path):
     [
         (
             "polygons={voxel_size_m: 0.06}",
-            {"configuration", "polygons", "cloud_to_mesh", "timesteps", "light", *AFTER_LIGHT},
+            {"polygons", "cloud_to_mesh", "transport", "light", *REFERENCE, *COMPARISON},
             {*BEFORE_STRUCTURE, "voxels", "sky", "optics"},
         ),
         (
             "voxels={estimator: ppl}",
-            {"configuration", "voxels", "timesteps", "light", *AFTER_LIGHT},
+            {"voxels", "transport", "light", *REFERENCE, *COMPARISON},
             {*BEFORE_STRUCTURE, "polygons", "sensors", "sky", "optics", "ground_map"},
         ),
         (
             "radiation={linke_turbidity: 4}",
-            {"configuration", "sky", "timesteps", "light", "ground_map", *AFTER_LIGHT},
-            {*BEFORE_STRUCTURE, "polygons", "voxels", "sensors", "optics", "tree_figure"},
+            {"sky", "light", "ground_map", *REFERENCE, *COMPARISON},
+            {*BEFORE_STRUCTURE, "polygons", "voxels", "sensors", "optics", "transport"},
+        ),
+        (
+            "optics={leaf: {chlorophyll_ug_cm2: 30}}",
+            {"optics", "light", "ground_map", *REFERENCE, *COMPARISON},
+            {*BEFORE_STRUCTURE, "polygons", "voxels", "sensors", "sky", "transport"},
         ),
         (
             "statistics={confidence: 0.9}",
-            {"configuration", "statistics", "comparison_figures", "runtime", "page"},
-            {*BEFORE_STRUCTURE, "polygons", "voxels", "sky", "timesteps", "light", "records"},
+            {"statistics", "comparison_figures", "runtime", "page"},
+            {*BEFORE_STRUCTURE, "polygons", "voxels", "sky", "light", "records", *REFERENCE},
         ),
     ],
 )
@@ -166,13 +182,13 @@ def test_an_edited_parameter_reruns_what_depends_on_it_and_nothing_else(
     small_run, edit, again, untouched
 ):
     planned = small_run.planned(config=[edit])
-    assert again <= planned
+    assert {"configuration", *again} <= planned
     assert not untouched & planned
 
 
 def test_a_parameter_of_voxels_reruns_the_light_in_voxels_alone(small_run):
     output = small_run.run("--dry-run", config=["voxels={estimator: ppl}"])
-    assert set(re.findall(r"Mitsuba, (\S+),", output)) == {"voxels_0.2", "voxels_1.0"}
+    assert set(re.findall(r"light series, (\S+),", output)) == {"voxels_0.2", "voxels_1.0"}
 
 
 def test_an_edit_of_the_code_of_polygons_reruns_polygons_and_not_the_scan(small_run, tmp_path):
@@ -180,7 +196,7 @@ def test_an_edit_of_the_code_of_polygons_reruns_polygons_and_not_the_scan(small_
     with (project.folder / "scripts/dapple/structure/polygons.py").open("a") as code:
         code.write("\n# edited\n")
     planned = project.planned()
-    assert {"polygons", "timesteps", "light", "page"} <= planned
+    assert {"polygons", "transport", "light", "page"} <= planned
     assert not {*BEFORE_STRUCTURE, "voxels", "sky"} & planned
 
 

@@ -8,7 +8,7 @@ from dapple.errors import InputError
 from dapple.formats.atomic import atomic
 from dapple.formats.light import read as read_netcdf
 from dapple.light.direct import Sunlit
-from dapple.light.transport import Transport
+from dapple.light.tensor import Transport
 
 ROWS = {
     "sensor": "index of the sensor where the paths start",
@@ -21,7 +21,7 @@ SENSORS = {
     "n_paths": "paths started from the sensor in each replicate",
     "cut": "paths given up at max_orders, of all replicates",
 }
-NUMBERS = ("n_replicates", "n_patches", "max_orders")
+SKY = "share of the sky patch that the sensor sees, weighted by the cosine"
 SUNLIT = {
     "share": ("share of the solar disc that is seen", ("replicate", "sensor", "time")),
     "standard_error": ("standard error of the share", ("sensor", "time")),
@@ -43,7 +43,9 @@ def write(path: str | Path, transport: Transport) -> None:
         name: ("start", getattr(transport, name), {"units": "1", "long_name": text})
         for name, text in SENSORS.items()
     }
-    _write(path, xr.Dataset(variables, attrs={n: getattr(transport, n) for n in NUMBERS}))
+    about = {"units": "1", "long_name": SKY}
+    variables["sky_seen"] = (("start", "set", "sky_patch"), transport.sky_seen, about)
+    _write(path, xr.Dataset(variables, attrs={"max_orders": transport.max_orders}))
 
 
 def read(path: str | Path) -> Transport:
@@ -54,9 +56,10 @@ def read(path: str | Path) -> Transport:
     InputError
         No such file, or one of another kind.
     """
-    dataset = _read(path, [*ROWS, *SENSORS], NUMBERS)
-    columns = {name: dataset[name].to_numpy() for name in (*ROWS, *SENSORS)}
-    return Transport(**columns, **{name: int(dataset.attrs[name]) for name in NUMBERS})
+    names = [*ROWS, *SENSORS, "sky_seen"]
+    dataset = _read(path, names, ("max_orders",))
+    columns = {name: dataset[name].to_numpy() for name in names}
+    return Transport(**columns, max_orders=int(dataset.attrs["max_orders"]))
 
 
 def write_sunlit(path: str | Path, sunlit: Sunlit) -> None:

@@ -32,6 +32,8 @@ class Reference:
         Groups of bands that are traced together, 1 to 3.
     sun_diameter_deg : float
         Of the solar disc [deg].
+    aperture_m : float
+        Diameter of the sensors' receiving discs [m].
     replicates, direct_rays, sky_rays, scattered_rays, max_depth : int
         See `Effort`.
     """
@@ -49,6 +51,7 @@ class Reference:
         sky_rays: int,
         scattered_rays: int,
         max_depth: int,
+        aperture_m: float,
         variant: str,
         seed: int,
     ):
@@ -57,7 +60,13 @@ class Reference:
         self.beam = sky["beam_normal_umol_m2_s"].transpose("time", "band").to_numpy()
         self.diffuse = sky["diffuse_horizontal_umol_m2_s"].transpose("time", "band").to_numpy()
         self.optics, self.group = group_bands(optics, self.beam, self.diffuse, bands)
-        self.sun_diameter_deg, self.variant = sun_diameter_deg, variant
+        self.sun_diameter_deg, self.aperture_m = sun_diameter_deg, aperture_m
+        self.variant = variant
+
+    @property
+    def settings(self) -> tuple:
+        """What a timestep depends on besides geometry, spectra and sky."""
+        return (self.effort, self.n_bands, self.sun_diameter_deg, self.aperture_m, self.seed)
 
     @cached_property
     def rendered(self) -> list[mitsuba_scene.RenderScene]:
@@ -85,6 +94,7 @@ class Reference:
                 diffuse_horizontal=group_flux(self.diffuse[index], self.group, self.n_bands),
                 sky=self.sky["perez"][index].to_numpy(),
                 effort=self.effort,
+                aperture_m=self.aperture_m,
                 seed=stream_seed(self.seed, placement, index),
             )
             for placement, scene in enumerate(self.rendered)
@@ -134,7 +144,7 @@ def run_all(
     for path in inputs:
         common.update(Path(path).read_bytes())
     common.update(sensors.to_csv().encode())
-    common.update(repr([reference.effort, reference.sun_diameter_deg, reference.seed]).encode())
+    common.update(repr(reference.settings).encode())
     for values in vars(reference.optics).values():
         common.update(np.ascontiguousarray(values).tobytes())
     computed = 0

@@ -12,7 +12,7 @@ from dapple.light.direct import Sunlit
 from dapple.light.patches import patches
 from dapple.light.scene import Optics
 from dapple.light.sky import patch_radiance
-from dapple.light.transport import Transport, summed_irradiance, sun_radiance
+from dapple.light.tensor import Transport, straight, summed_scattered, sun_radiance
 
 PARTS = {
     "par_umol_m2_s": "photosynthetically active radiation",
@@ -21,6 +21,10 @@ PARTS = {
     "par_scattered_umol_m2_s": "PAR scattered by leaves, bark and ground",
     "standard_error_umol_m2_s": "standard error of PAR",
 }
+
+DIRECT_SHARE, PATH_SHARE = 0.75, 0.45
+"""How a tolerance is shared out between shadow rays and paths, with a margin: the real sky is not
+the nominal one by which the number of paths is judged."""
 
 
 def towards_sun(sky: xr.Dataset) -> np.ndarray:
@@ -35,6 +39,12 @@ def open_sky_par(sky: xr.Dataset) -> xr.DataArray:
     upward = np.maximum(np.cos(np.radians(sky["sun_zenith_deg"])), 0)
     beam = sky["beam_normal_umol_m2_s"].sum("band")
     return beam * upward + sky["diffuse_horizontal_umol_m2_s"].sum("band")
+
+
+def level_beam(sky: xr.Dataset) -> np.ndarray:
+    """(t,) PAR straight from the sun on level ground without a tree [µmol m⁻² s⁻¹]."""
+    upward = np.maximum(np.cos(np.radians(sky["sun_zenith_deg"].to_numpy())), 0)
+    return sky["beam_normal_umol_m2_s"].sum("band").to_numpy() * upward
 
 
 @dataclass(frozen=True)
@@ -98,17 +108,17 @@ def compute(
         subdivision,
     )
     spread = sun_radiance(sun, subdivision, kernel_deg=sun_kernel_deg)
-    straight = summed_irradiance(transport, radiance, diffuse, optics, scattered=False)
-    scattered = summed_irradiance(transport, radiance, diffuse, optics)
-    scattered += summed_irradiance(transport, spread, beam, optics)
-    level_beam = beam.sum(axis=1) * np.maximum(sun[:, 2], 0)
+    from_sky = straight(transport, radiance) * diffuse.sum(axis=1)
+    scattered = summed_scattered(transport, radiance, diffuse, optics)
+    scattered += summed_scattered(transport, spread, beam, optics)
+    straight_beam = level_beam(sky)
     # Shadow rays and paths are drawn independently: their variances add.
-    variance = (straight + scattered).var(axis=1, ddof=1) / transport.n_replicates
+    variance = (from_sky + scattered).var(axis=1, ddof=1) / transport.n_replicates
     return Light(
-        direct=sunlit.share.mean(axis=0) * level_beam,
-        sky=straight.mean(axis=1),
+        direct=sunlit.share.mean(axis=0) * straight_beam,
+        sky=from_sky.mean(axis=1),
         scattered=scattered.mean(axis=1),
-        standard_error=np.sqrt(variance + (sunlit.standard_error * level_beam) ** 2),
+        standard_error=np.sqrt(variance + (sunlit.standard_error * straight_beam) ** 2),
     )
 
 
@@ -133,16 +143,16 @@ def summarise(placements: list[Light], sensors: list[str], sky: xr.Dataset) -> x
     error = placements[0].standard_error
     if len(placements) > 1:
         error = np.std([p.par for p in placements], axis=0, ddof=1) / np.sqrt(len(placements))
-    direct, straight, scattered = (
+    direct, from_sky, scattered = (
         np.mean([getattr(p, part) for p in placements], axis=0)
         for part in ("direct", "sky", "scattered")
     )
     return dataset(
         sensors,
         times(sky),
-        par=direct + straight + scattered,
+        par=direct + from_sky + scattered,
         direct=direct,
-        sky=straight,
+        sky=from_sky,
         scattered=scattered,
         standard_error=error,
     )

@@ -111,6 +111,24 @@ class TracedScene:
         return point, normal, leaf, voxel, mesh & ~leaf, ground, crossed
 
     @dr.syntax
+    def meet(self, origin, direction, rng, active):
+        """As `segment`, but across the sides of the cell: returns all but `crossed`."""
+        mi = self.mi
+        point, normal = mi.Point3f(origin), mi.Normal3f(0, 0, 1)
+        leaf, voxel, bark, ground = mi.Bool(False), mi.Bool(False), mi.Bool(False), mi.Bool(False)
+        going = mi.Bool(active)
+        while going:
+            end, facing, *kinds, crossed = self.segment(point, direction, rng, going)
+            normal[going] = facing
+            leaf |= going & kinds[0]
+            voxel |= going & kinds[1]
+            bark |= going & kinds[2]
+            ground |= going & kinds[3]
+            point[going] = end
+            going &= crossed
+        return point, normal, leaf, voxel, bark, ground
+
+    @dr.syntax
     def transmittance(self, origin, direction, active):
         """Share of light that gets through along rays to the sky; 0 where they are not active."""
         mi = self.mi

@@ -1,4 +1,4 @@
-"""What tests of the whole workflow share: a copy of the project to run, edit and break."""
+"""A copy of the project in a folder of its own: to run, to edit, to break."""
 
 import os
 import shutil
@@ -7,9 +7,7 @@ import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import pytest
-
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 PARTS = ("Snakefile", "rules", "scripts", "config", "profiles", "envs", "docs")
 SMALL = "config/virtual-apple-small.yaml"
 
@@ -90,17 +88,3 @@ def copy_of_project(folder, configfile=SMALL, overrides=(), experiment="virtual-
     if (ROOT / ".tools").is_dir():
         (folder / ".tools").symlink_to(ROOT / ".tools")
     return Project(folder, configfile, tuple(overrides), experiment)
-
-
-@pytest.fixture(scope="session")
-def small_run(tmp_path_factory):
-    """The whole chain in a small virtual world, run once for all tests; not to be edited."""
-    project = copy_of_project(tmp_path_factory.mktemp("small") / "dapple")
-    project.run()
-    return project
-
-
-@pytest.fixture
-def project(tmp_path):
-    """A copy of the project without results, to be edited and broken."""
-    return copy_of_project(tmp_path / "dapple")

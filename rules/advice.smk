@@ -1,0 +1,166 @@
+"""
+Advice and trade-off: how finely light has to be computed. Not part of a plain run.
+
+Needs   structure/, sky/, classes/cloud.laz, scan/shots.parquet
+Makes   advice.yaml                       what each refinement changes and costs on a pilot
+        figures/advice.png                the same as a picture
+        light/model.json                  the cheapest model within the tolerance, for light.model: advised
+        structure/polygons_{size}/        polygons of other voxel sizes
+        tradeoff/points.csv               error and cost over a grid of settings
+        tradeoff/chart.png, chart.html    accuracy against speed
+"""
+
+# What the pilot and the grid have in common with the run itself.
+PILOT = {
+    "max_orders": settings.light.transport.max_orders,
+    "sun_kernel_deg": settings.light.transport.sun_kernel_deg,
+    "sun_diameter_deg": settings.light.sun_diameter_deg,
+    "aperture_m": settings.light.aperture_m,
+    "ground_z_m": settings.ground_z_m,
+    "variant": f"{VARIANT}_mono",
+}
+
+if settings.source != "wood":
+
+    rule sized_polygons:
+        input:
+            cloud=results("classes/cloud.laz"),
+            truth=[],
+            code=code("polygons"),
+        output:
+            leaves=results("structure/polygons_{size}/leaves_0.ply"),
+            wood=results("structure/polygons_{size}/wood.ply"),
+            summary=results("structure/polygons_{size}/summary.json"),
+        log:
+            logs("sized_polygons_{size}"),
+        benchmark:
+            benchmarks("sized_polygons_{size}")
+        conda:
+            "../envs/dapple.yaml"
+        threads: 2
+        resources:
+            mem_mb=2000,
+        params:
+            **settings.polygons.model_dump(exclude={"voxel_size_m"}),
+            voxel_size_m=lambda wildcards: float(wildcards.size),
+            seed=stream("polygons"),
+        message:
+            "{settings.experiment}: polygons from {wildcards.size} m voxels"
+        script:
+            "../scripts/polygons.py"
+
+
+if LIT:
+
+    rule advice:
+        input:
+            **sized(settings.advice),
+            code=code("advice"),
+        output:
+            advice=results("advice.yaml"),
+            model=results("light/model.json"),
+        log:
+            logs("advice"),
+        benchmark:
+            benchmarks("advice")
+        conda:
+            "../envs/dapple.yaml"
+        threads: 2
+        resources:
+            mem_mb=4000,
+        params:
+            **settings.advice.model_dump(),
+            **PILOT,
+            shadow_tolerance=settings.light.transport.tolerance,
+            max_shadow_rays=settings.light.transport.max_shadow_rays,
+            source=settings.source,
+            seed=stream("advice"),
+        message:
+            "{settings.experiment}: what each refinement of the light changes and costs"
+        script:
+            "../scripts/advice.py"
+
+    rule advice_figure:
+        input:
+            advice=results("advice.yaml"),
+            code=code("advice_figure"),
+        output:
+            figure=report(
+                results("figures/advice.png"),
+                caption="../docs/captions/advice.rst",
+                category="Light",
+            ),
+        log:
+            logs("advice_figure"),
+        benchmark:
+            benchmarks("advice_figure")
+        conda:
+            "../envs/dapple.yaml"
+        threads: 1
+        resources:
+            mem_mb=500,
+        message:
+            "{settings.experiment}: picture of the advice"
+        script:
+            "../scripts/advice_figure.py"
+
+    rule tradeoff_points:
+        input:
+            **sized(settings.tradeoff),
+            code=code("tradeoff_points"),
+        output:
+            points=results("tradeoff/points.csv"),
+        log:
+            logs("tradeoff_points"),
+        benchmark:
+            benchmarks("tradeoff_points")
+        conda:
+            "../envs/dapple.yaml"
+        threads: 2
+        resources:
+            mem_mb=4000,
+        params:
+            **settings.tradeoff.model_dump(exclude={"max_orders"}),
+            **PILOT,
+            orders=settings.tradeoff.max_orders,
+            timestep=REFERENCE,
+            seed=stream("tradeoff"),
+        message:
+            "{settings.experiment}: error and cost of a grid of settings"
+        script:
+            "../scripts/tradeoff_points.py"
+
+    rule tradeoff_chart:
+        input:
+            points=results("tradeoff/points.csv"),
+            code=code("tradeoff_chart"),
+        output:
+            chart=report(
+                results("tradeoff/chart.png"),
+                caption="../docs/captions/tradeoff.rst",
+                category="Light",
+            ),
+            page=results("tradeoff/chart.html"),
+        log:
+            logs("tradeoff_chart"),
+        benchmark:
+            benchmarks("tradeoff_chart")
+        conda:
+            "../envs/dapple.yaml"
+        threads: 1
+        resources:
+            mem_mb=1000,
+        params:
+            experiment=settings.experiment,
+        message:
+            "{settings.experiment}: accuracy against speed"
+        script:
+            "../scripts/tradeoff_chart.py"
+
+    rule tradeoff:
+        input:
+            results("tradeoff/points.csv"),
+            results("tradeoff/chart.png"),
+            results("tradeoff/chart.html"),
+        message:
+            "{settings.experiment}: tradeoff/"

@@ -1,0 +1,281 @@
+"""Light for any sky, spectrum and time from rays and paths that were traced once.
+
+Straight rays tell how much of every sky patch a sensor sees. Paths that meet something are counted
+by sensor, sky patch and what they met; counts are integers and do not depend on threads. A sky is
+a radiance per patch, a spectrum a factor per event: light at every time and in every band is a
+product of what was traced with both.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from dapple.frames import direction_from_angles
+from dapple.light.patches import Patches, patches
+from dapple.light.scene import Optics
+
+NOMINAL_SUNS_DEG = ((30, 0), (30, 120), (30, 240), (60, 60), (60, 180), (60, 300))
+"""Zenith and azimuth of the suns under which a pilot is judged."""
+NOMINAL_DIFFUSE_SHARE = 0.2
+"""Of the light of the clear sky under which a pilot is judged."""
+NOMINAL_AUREOLE_DEG = 15.0
+"""Standard deviation of the bright part of that sky around the sun."""
+
+
+@dataclass(frozen=True)
+class Transport:
+    """What sensors see of the sky, and counted paths that met something.
+
+    Attributes
+    ----------
+    sky_seen : (n_sensors, r, p) float32
+        Share of every sky patch that each sensor sees, weighted by the cosine, in independent
+        replicates; with voxels the transmittance.
+    sensor, replicate, patch : (k,) int32
+        Where a path started, in which independent set, and in which sky patch it left.
+    orders : (k, 4) uint8
+        Leaf reflections a, leaf transmissions b, bark and ground reflections; never all 0.
+    count : (k,) int64
+        Paths of this kind.
+    n_paths : (n_sensors,) int64
+        Paths started from each sensor in each replicate.
+    cut : (n_sensors,) int64
+        Paths that were given up at `max_orders`, of all replicates.
+    max_orders : int
+        Most surfaces on a path.
+    """
+
+    sky_seen: np.ndarray
+    sensor: np.ndarray
+    replicate: np.ndarray
+    patch: np.ndarray
+    orders: np.ndarray
+    count: np.ndarray
+    n_paths: np.ndarray
+    cut: np.ndarray
+    max_orders: int
+
+    @property
+    def n_replicates(self) -> int:
+        """Independent sets."""
+        return self.sky_seen.shape[1]
+
+    @property
+    def n_patches(self) -> int:
+        """Subdivision of the sky."""
+        return self.sky_seen.shape[2]
+
+    def truncated_share(self, optics: Optics) -> np.ndarray:
+        """(n_sensors,) what could be lost at `max_orders`, as a share of an even open sky.
+
+        An upper bound: every surface that a lost path met sends on at most the largest albedo.
+        """
+        leaf = optics.leaf_reflectance + optics.leaf_transmittance
+        albedo = max(x.max() for x in (leaf, optics.bark_reflectance, optics.ground_reflectance))
+        return self.cut / (self.n_paths * self.n_replicates) * albedo**self.max_orders
+
+
+def nominal_error(transport: Transport, optics: Optics, *, sun_kernel_deg: float) -> np.ndarray:
+    """Standard error of scattered light under nominal skies.
+
+    Parameters
+    ----------
+    transport : Transport
+        Counted paths.
+    optics : Optics
+        Its bands share the light evenly.
+    sun_kernel_deg : float
+        See `sun_radiance`.
+
+    Returns
+    -------
+    (n_sensors,) float64
+        As a share of the open sky's light, the largest one under an overcast sky of even radiance
+        and clear ones.
+    """
+    sky = patches(transport.n_patches)
+    overcast, clear, suns = _nominal_skies(sky)
+    beam = (1 - NOMINAL_DIFFUSE_SHARE) / suns[:, 2:]
+    clear = clear + beam * sun_radiance(suns, sky, kernel_deg=sun_kernel_deg)
+    flux = np.full((1 + len(suns), len(optics)), 1 / len(optics))
+    light = summed_scattered(transport, np.concatenate([overcast, clear]), flux, optics)
+    return np.sqrt(light.var(axis=1, ddof=1) / transport.n_replicates).max(axis=1)
+
+
+def nominal_straight_error(sky_seen: np.ndarray) -> np.ndarray:
+    """Standard error of light straight from nominal skies, like `nominal_error`.
+
+    Parameters
+    ----------
+    sky_seen : (n_sensors, r, p) float32
+        Share of every sky patch that sensors see.
+    """
+    sky = patches(sky_seen.shape[2])
+    overcast, clear, _ = _nominal_skies(sky)
+    weight = np.concatenate([overcast, clear]) * sky.projected_solid_angle_sr
+    light = sky_seen.astype(np.float64) @ weight.T
+    return np.sqrt(light.var(axis=1, ddof=1) / sky_seen.shape[1]).max(axis=1)
+
+
+def _nominal_skies(sky: Patches) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Radiance (1, p) of an overcast sky, (s, p) of clear ones without sun, and (s, 3) the suns.
+
+    The open sky gives 1 in all; half the clear sky's light comes from around the sun.
+    """
+    suns = direction_from_angles(*np.array(NOMINAL_SUNS_DEG, float).T)
+    even = np.full((1, sky.n), 1 / np.pi)
+    around = sun_radiance(suns, sky, kernel_deg=NOMINAL_AUREOLE_DEG)
+    around /= (around @ sky.projected_solid_angle_sr)[:, None]
+    return even, 0.5 * NOMINAL_DIFFUSE_SHARE * (even + around), suns
+
+
+def spectral_factor(orders: np.ndarray, optics: Optics) -> np.ndarray:
+    """What is left of light after the events of a path.
+
+    Parameters
+    ----------
+    orders : (k, 4) uint8
+        Leaf reflections, leaf transmissions, bark and ground reflections.
+    optics : Optics
+        In b bands.
+
+    Returns
+    -------
+    (k, b) float64
+        2^(a + b) ρ^a τ^b ρ_bark^c ρ_ground^d; the powers of two undo the even choice between
+        reflection and transmission.
+    """
+    bases = (
+        2 * optics.leaf_reflectance,
+        2 * optics.leaf_transmittance,
+        optics.bark_reflectance,
+        optics.ground_reflectance,
+    )
+    factor = np.ones((len(orders), len(optics)))
+    for column, base in enumerate(bases):
+        powers = base ** np.arange(orders[:, column].max(initial=0) + 1)[:, None]
+        factor *= powers[orders[:, column]]
+    return factor
+
+
+def straight(transport: Transport, radiance: np.ndarray) -> np.ndarray:
+    """Irradiance at the sensors straight from a sky.
+
+    Parameters
+    ----------
+    transport : Transport
+        What sensors see of the sky.
+    radiance : (t, p) float64
+        Radiance of every sky patch at every time [per sr].
+
+    Returns
+    -------
+    (n_sensors, r, t) float64
+        In units of the radiance times sr.
+    """
+    weight = radiance * patches(transport.n_patches).projected_solid_angle_sr
+    return transport.sky_seen.astype(np.float64) @ weight.T
+
+
+def scattered(transport: Transport, radiance: np.ndarray, optics: Optics) -> np.ndarray:
+    """Irradiance at the sensors by light that met something, in every band.
+
+    Parameters
+    ----------
+    transport : Transport
+        Counted paths.
+    radiance : (t, p) float64
+        Radiance of every sky patch at every time, equal in all bands [per sr].
+    optics : Optics
+        Spectra in b bands.
+
+    Returns
+    -------
+    (n_sensors, r, t, b) float64
+        In units of the radiance times sr.
+    """
+    result = np.zeros((*transport.sky_seen.shape[:2], len(radiance), len(optics)))
+    kinds, pieces = _by_kind(transport, radiance)
+    factor = spectral_factor(kinds, optics)
+    for sensor, mine, light in pieces:
+        result[sensor] = np.einsum("rkt,kb->rtb", light, factor[mine], optimize=True)
+    return result
+
+
+def summed_scattered(
+    transport: Transport, radiance: np.ndarray, flux: np.ndarray, optics: Optics
+) -> np.ndarray:
+    """Irradiance at the sensors by light that met something, summed over the bands.
+
+    Parameters
+    ----------
+    transport, radiance, optics
+        As in `scattered`.
+    flux : (t, b) float64
+        The light of each band at each time: what the radiance is multiplied with.
+
+    Returns
+    -------
+    (n_sensors, r, t) float64
+        In units of the radiance times sr times the flux.
+    """
+    result = np.zeros((*transport.sky_seen.shape[:2], len(radiance)))
+    kinds, pieces = _by_kind(transport, radiance)
+    passed = spectral_factor(kinds, optics) @ flux.T
+    for sensor, mine, light in pieces:
+        result[sensor] = np.einsum("rkt,kt->rt", light, passed[mine])
+    return result
+
+
+def _by_kind(transport: Transport, radiance: np.ndarray):
+    """Kinds of paths (k, 4), and for each sensor which it has and the sky's light along them.
+
+    The second is an iterator over sensor, kinds (m,) and light (r, m, t).
+    """
+    packed = np.ascontiguousarray(transport.orders).view("<u4").ravel()
+    kinds, kind = np.unique(packed, return_inverse=True)
+    bounds = np.searchsorted(transport.sensor, np.arange(len(transport.n_paths) + 1))
+    by_patch = np.ascontiguousarray(radiance.T)
+    n_replicates = transport.n_replicates
+
+    def pieces() -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
+        for sensor in np.flatnonzero(np.diff(bounds)):
+            rows = slice(bounds[sensor], bounds[sensor + 1])
+            mine, own_kind = np.unique(kind[rows], return_inverse=True)
+            row = transport.replicate[rows].astype(np.int64) * len(mine) + own_kind
+            weight = transport.count[rows] * (np.pi / transport.n_paths[sensor])
+            counted = sparse.csr_array(
+                (weight, (row, transport.patch[rows])),
+                shape=(n_replicates * len(mine), transport.n_patches),
+            )
+            yield sensor, mine, (counted @ by_patch).reshape(n_replicates, len(mine), -1)
+
+    return kinds.astype("<u4").view(np.uint8).reshape(-1, 4), pieces()
+
+
+def sun_radiance(sun_directions: np.ndarray, sky: Patches, *, kernel_deg: float) -> np.ndarray:
+    """Spread a beam of unit normal irradiance over the patches around the sun.
+
+    Scattered light changes little with the direction from which the beam comes, so that the paths
+    of neighbouring patches tell it with less noise than those of one patch.
+
+    Parameters
+    ----------
+    sun_directions : (t, 3) float64
+        Unit vectors towards the sun.
+    sky : Patches
+        Subdivision of the sky.
+    kernel_deg : float
+        Standard deviation of the von Mises-Fisher kernel [deg].
+
+    Returns
+    -------
+    (t, p) float64
+        Radiance that sums to 1 with the solid angles; zero for a sun below the horizon.
+    """
+    cosine = sun_directions @ sky.directions.T
+    weight = np.exp((cosine - 1) / np.radians(kernel_deg) ** 2)
+    weight /= (weight * sky.solid_angle_sr).sum(axis=1, keepdims=True)
+    return np.where(sun_directions[:, 2:] > 0, weight, 0.0)

@@ -1,0 +1,88 @@
+"""How much of a stand a scan leaves in shadow."""
+
+import numpy as np
+
+from dapple.errors import InputError
+from dapple.survey.reach import HIT, UNSEEN
+
+
+def in_cells(voxels: np.ndarray, per_edge: int, reduce: str = "mean") -> np.ndarray:
+    """Mean or sum of voxels over cells of `per_edge` voxels along each edge."""
+    if any(count % per_edge for count in voxels.shape):
+        raise InputError(
+            "survey.cell_size_m",
+            f"cells of {per_edge} voxels in a grid of {voxels.shape}",
+            "a size that divides every edge",
+            "Choose cells and volume so that one divides the other.",
+        )
+    nx, ny, nz = (count // per_edge for count in voxels.shape)
+    blocks = voxels.reshape(nx, per_edge, ny, per_edge, nz, per_edge)
+    return getattr(blocks, reduce)(axis=(1, 3, 5))
+
+
+def voxels_per_cell(cell_size_m: float, voxel_size_m: float) -> int:
+    """Voxels along the edge of a cell.
+
+    Raises
+    ------
+    InputError
+        One does not divide the other.
+    """
+    ratio = cell_size_m / voxel_size_m
+    if ratio < 1 or abs(ratio - round(ratio)) > 1e-6:
+        raise InputError(
+            "survey.cell_size_m",
+            f"{cell_size_m:g} m with voxels of {voxel_size_m:g} m",
+            "a multiple of survey.voxel_size_m",
+            "Contact frequency counts the voxels in a cell.",
+        )
+    return round(ratio)
+
+
+def relative_shadow(attribute: np.ndarray, filled: np.ndarray) -> dict[str, float]:
+    """Shares of the truly filled voxels that a scan did not see.
+
+    Parameters
+    ----------
+    attribute : (nx, ny, nz) uint8
+        From `reach.attribute`.
+    filled : (nx, ny, nz) bool
+        Voxels that hold some leaf or wood.
+
+    Returns
+    -------
+    dict
+        `rs`, filled voxels that no beam reached; `not_hit`, filled voxels without a return, though
+        beams may have passed them; `false_hits`, the share of returns' voxels that hold nothing.
+    """
+    of_filled = attribute[filled]
+    if not len(of_filled):
+        raise InputError("survey.stands", "no filled voxel", "a stand", "It holds nothing to see.")
+    hit = attribute == HIT
+    return {
+        "rs": float((of_filled == UNSEEN).mean()),
+        "not_hit": float((of_filled != HIT).mean()),
+        "false_hits": float((~filled[hit]).mean()) if hit.any() else 0.0,
+    }
+
+
+def filled_profile(attribute: np.ndarray, filled: np.ndarray) -> dict[str, np.ndarray]:
+    """Number of filled voxels in every layer: truly, hit, and hit or passed though filled."""
+    return {
+        "true": filled.sum(axis=(0, 1)),
+        "hit": (attribute == HIT).sum(axis=(0, 1)),
+        "reached": (filled & (attribute != UNSEEN)).sum(axis=(0, 1)),
+    }
+
+
+def shadow_map(
+    attribute: np.ndarray, filled: np.ndarray, per_edge: int, bottom: int, top: int
+) -> np.ndarray:
+    """Relative shadow of columns of `per_edge` voxels between two layers; NaN without foliage."""
+    layer = slice(bottom, top)
+    nx, ny = (count // per_edge for count in filled.shape[:2])
+    shape = (nx, per_edge, ny, per_edge, -1)
+    n_filled = filled[:, :, layer].reshape(shape).sum(axis=(1, 3, 4))
+    unseen = (filled & (attribute == UNSEEN))[:, :, layer].reshape(shape).sum(axis=(1, 3, 4))
+    with np.errstate(invalid="ignore"):
+        return np.where(n_filled > 0, unseen / n_filled, np.nan)

@@ -1,0 +1,18 @@
+"""Put the timesteps of one reconstruction together."""
+
+import xarray as xr
+
+from dapple.formats import light
+from dapple.workflow import run
+
+
+def main(snakemake):
+    times = [light.read(path) for path in snakemake.input.times]
+    series = xr.concat(
+        times, "time", data_vars="minimal", coords="minimal", combine_attrs="drop_conflicts"
+    )
+    light.write(snakemake.output.light, series)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

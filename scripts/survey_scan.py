@@ -1,0 +1,57 @@
+"""Scan a stand by one design: voxels hit and passed at every density, and plant area density."""
+
+import time
+
+from dapple.formats import survey, voxels
+from dapple.streams import stream_seed
+from dapple.structure.voxels import Grid, plant_area_density
+from dapple.survey import designs, hemisphere
+from dapple.survey.reach import Reach
+from dapple.virtual import stands
+from dapple.workflow import options, run
+
+
+def main(snakemake):
+    settings = options(snakemake.params)
+    stand = stands.grow(snakemake.wildcards.stand, **settings["stand"])
+    scanner = hemisphere.Hemisphere(**settings["scanner"])
+    positions_m = designs.positions(
+        snakemake.wildcards.design, stand.size_m, settings["height_m"], settings["positions_m"]
+    )
+    shape = stands.grid_shape(stand.size_m, settings["voxel_size_m"])
+    cells = Grid(
+        (0.0, 0.0, 0.0),
+        stands.grid_shape(stand.size_m, settings["cell_size_m"]),
+        settings["cell_size_m"],
+    )
+    reach = Reach.empty(shape, settings["voxel_size_m"])
+    bit = scanner.azimuth_steps_deg.index(settings["density_step_deg"])
+    begun = time.perf_counter()
+
+    def shots():
+        world = hemisphere.world_of(stand)
+        for number, position_m in enumerate(positions_m):
+            seed = stream_seed(settings["seed"], snakemake.wildcards.design, number)
+            for beams in hemisphere.scan(
+                world, stand, position_m, scanner, len(positions_m), seed
+            ):
+                reach.add(beams)
+                if (beams.bits >> bit & 1).any():
+                    yield beams.shots(bit, number + 1)
+
+    density = plant_area_density(shots(), cells, contact_voxel_m=0.0)
+    hit, passed = reach.joined()
+    seconds = time.perf_counter() - begun
+    n_beams = scanner.n_beams(len(positions_m))
+    print(f"{max(n_beams)} beams of {scanner.sub_rays} rays in {seconds:.1f} s")
+    survey.write(
+        snakemake.output.reach,
+        {"hit": hit, "passed": passed},
+        n_beams=n_beams,
+        voxel_size_m=settings["voxel_size_m"],
+    )
+    voxels.write(snakemake.output.cells, density)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

@@ -1,0 +1,36 @@
+"""Trace paths from the sensors once, for any sky, spectrum and time."""
+
+from dapple.formats import scenes
+from dapple.formats import transport as files
+from dapple.light import sensors, series, traced, transport
+from dapple.optics.surfaces import scene_optics
+from dapple.workflow import run
+
+
+def main(snakemake):
+    params, inputs = snakemake.params, snakemake.input
+    scene = scenes.read([inputs.leaves], inputs.wood, params.ground_z_m)[0]
+    table = sensors.read_local(inputs.sensors)
+    print(f"variant {params.variant}, {len(table)} sensors")
+    counted = transport.collect(
+        traced.load(scene, params.variant),
+        table[["x_m", "y_m", "z_m"]].to_numpy(),
+        n_sky_rays=params.sky_rays,
+        n_paths=params.paths,
+        max_growth=params.max_growth,
+        n_patches=params.sky_patches,
+        max_orders=params.max_orders,
+        tolerance=series.PATH_SHARE * params.tolerance,
+        # Nominal spectra: the run's own may change without tracing again.
+        optics=scene_optics(),
+        sun_kernel_deg=params.sun_kernel_deg,
+        aperture_m=params.aperture_m,
+        seed=params.seed,
+    )
+    started = counted.n_paths * counted.n_replicates
+    print(f"{started.min()} to {started.max()} paths a sensor, {counted.cut.sum()} given up")
+    files.write(snakemake.output.transport, counted)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

@@ -1,0 +1,117 @@
+"""Real trees and scans through the chain, at reduced cost; skipped where the data is absent."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from tests.workflow.project import ROOT, copy_of_project
+
+DATA = (ROOT / "../shared/data").resolve()
+THREE_TIMES = (
+    "time={start: 2023-08-10 11:00, end: 2023-08-10 15:00, step_min: 120}",
+    "sensors={columns: 4, rows: 3, spacing_m: 2.0}",
+    "light={timestep: {replicates: 4, step_min: 120}, transport: {tolerance: 0.02}}",
+    "figures={map_spacing_m: 1.0}",
+)
+
+
+def project_on_real_data(folder, experiment, needs, overrides=()):
+    """A copy of the project that reads the real data where it lies."""
+    if not (DATA / needs).is_file():
+        pytest.skip(f"no real data: {DATA / needs} is absent")
+    return copy_of_project(
+        folder / "dapple",
+        f"config/{experiment}.yaml",
+        (f"data_dir={DATA}", *overrides),
+        experiment,
+    )
+
+
+def summary(project, reconstruction):
+    return json.loads(project.result(f"structure/{reconstruction}/summary.json").read_text())
+
+
+@pytest.fixture(scope="session")
+def leafy_tree(tmp_path_factory):
+    """A real leaf-on tree without reflectance: polygons, and light at a few sensors."""
+    folder = tmp_path_factory.mktemp("leafy-tree")
+    project = project_on_real_data(folder, "leafy-tree", "leafy-tree/pc_tree.txt", THREE_TIMES)
+    project.run()
+    return project
+
+
+@pytest.fixture(scope="session")
+def single_scan(tmp_path_factory):
+    """A real scan whose misses are rebuilt: plant area density."""
+    folder = tmp_path_factory.mktemp("single-scan")
+    project = project_on_real_data(folder, "single-scan", "single-scan/TLS_scan.laz")
+    project.run()
+    return project
+
+
+def test_a_real_tree_gets_leaf_and_wood_of_a_tree_s_size(leafy_tree):
+    facts = summary(leafy_tree, "polygons")
+    assert facts["n_elements"] > 1000
+    assert 10 < facts["leaf_area_m2"] < 1000
+    assert 0 < facts["wood_area_m2"] < facts["leaf_area_m2"]
+
+
+def test_under_a_real_tree_it_is_darker_than_in_the_open_and_nowhere_dark(leafy_tree):
+    with xr.open_dataset(leafy_tree.result("light/polygons.nc")) as light:
+        par = light["par_umol_m2_s"].load()
+    with xr.open_dataset(leafy_tree.result("sky/sky.nc")) as sky:
+        sky.load()
+    cosine = np.cos(np.radians(sky["sun_zenith_deg"])).to_numpy()
+    beam = sky["beam_normal_umol_m2_s"].sum("band").to_numpy() * cosine
+    open_sky = beam + sky["diffuse_horizontal_umol_m2_s"].sum("band").to_numpy()
+    assert dict(par.sizes) == {"sensor": 12, "time": 3}
+    share = par.mean("sensor").to_numpy() / open_sky
+    assert (share < 0.9).all()
+    assert (share > 0.05).all()
+    assert float(par.min()) > 0
+    # Leaves scatter, but no sensor gets much more than the open sky.
+    assert (par.max("sensor").to_numpy() < 1.3 * open_sky).all()
+
+
+def test_a_real_tree_is_told_in_pictures_without_a_comparison(leafy_tree):
+    made = {path.name for path in leafy_tree.result("figures").glob("*.png")}
+    assert {"tree.png", "series.png", "ground_map.png"} <= made
+    assert not leafy_tree.result("statistics/overall.csv").exists()
+
+
+def density(project, name):
+    """Plant area density as a series over the lower corner of 1 m voxels, unknown ones left out."""
+    with xr.open_dataset(project.result(f"structure/{name}/voxels.nc")) as voxels:
+        known = voxels["plant_area_density_m2_m3"].to_series().dropna().rename("pad")
+    metre = np.floor(np.array(known.index.to_list()) + 1e-9).astype(int)
+    return known.groupby([metre[:, 0], metre[:, 1], metre[:, 2]])
+
+
+@pytest.mark.parametrize("name", ["voxels_0.2", "voxels_1.0"])
+def test_a_real_scan_gets_the_density_of_a_forest(single_scan, name):
+    facts = summary(single_scan, name)
+    assert 0.95 * 2082 * 580 < facts["total_shots"] <= 2082 * 580
+    assert 0 < facts["total_misses"] < facts["total_shots"]
+    assert 0.1 < facts["mean_pad_m2_m3"] < 5
+    assert facts["n_unknown"] > 0  # behind others: unknown, not empty
+    values = density(single_scan, name).mean()
+    assert values.min() == 0  # seen through, and no leaf was hit
+    assert values.max() <= 5
+
+
+def test_small_and_large_voxels_agree_where_every_small_one_is_known(single_scan):
+    fine = density(single_scan, "voxels_0.2").agg(["mean", "size"])
+    fine = fine[fine["size"] == 5**3]["mean"].rename("fine")
+    both = fine.to_frame().join(density(single_scan, "voxels_1.0").mean().rename("coarse")).dropna()
+    assert len(both) > 100
+    assert both["fine"].sum() == pytest.approx(both["coarse"].sum(), rel=0.3)
+    assert both.corr().loc["fine", "coarse"] > 0.9
+
+
+def test_the_published_tree_can_be_planned_from_its_own_records(tmp_path):
+    project = project_on_real_data(tmp_path, "apple", "apple/bark.obj")
+    planned = project.planned()
+    assert {"real_wood", "virtual_leaves", "registration", "voxels", "light"} <= planned
+    assert {"statistics", "page"} <= planned
+    assert not {"plant", "ingest"} & planned
