@@ -123,6 +123,7 @@ if LIT:
             **settings.tradeoff.model_dump(exclude={"max_orders"}),
             **PILOT,
             orders=settings.tradeoff.max_orders,
+            polygon_size_m=settings.polygons.voxel_size_m,
             timestep=REFERENCE,
             seed=stream("tradeoff"),
         message:

@@ -47,6 +47,7 @@ REFERENCE = settings.light.timestep.model_dump(exclude={"step_min"}) | {
     "variant": f"{VARIANT}_rgb",
 }
 CHECKED = LIT if settings.light.engine == "transport" and settings.light.check else ()
+ADVISED = settings.light.model == "advised"
 COMPARED = LIT if settings.measured.kind != "none" else ()
 
 
@@ -144,8 +145,12 @@ def sized(section):
     return {
         "leaves": leaf_meshes("polygons")[0],
         "wood": results("structure/polygons/wood.ply"),
-        "sized_leaves": [results(f"structure/polygons_{size}/leaves_0.ply") for size in polygons],
-        "sized_wood": [results(f"structure/polygons_{size}/wood.ply") for size in polygons],
+        "sized_leaves": [
+            results(f"structure/polygons_{size}/leaves_0.ply") for size in polygons
+        ],
+        "sized_wood": [
+            results(f"structure/polygons_{size}/wood.ply") for size in polygons
+        ],
         "voxels": [results(f"structure/voxels_{size}/voxels.nc") for size in voxels],
         "truth": [results(f"structure/truth/{kind}.ply") for kind in truth],
         "sensors": results("sky/sensors.csv"),
@@ -158,7 +163,7 @@ SURVEY_FILES = (
     "shadowing.csv",
     "regression.csv",
     "profile.csv",
-    "plan.csv",
+    "plan.png",
 )
 
 

@@ -1,7 +1,8 @@
 """
 Light: what arrives at the sensors.
 
-Needs   structure/{reconstruction}/, sky/sky.nc, sky/optics.nc, sky/sensors.csv
+Needs   structure/{reconstruction}/, sky/sky.nc, sky/optics.nc, sky/sensors.csv; light/model.json where
+        light.model is advised
 Makes   registration/registration.json                  origin of the tree's frame, clock offset
         light/transport/{reconstruction}_{placement}.nc counted paths: any sky, spectrum and time
         light/{reconstruction}.nc                       the series of all times
@@ -119,13 +120,14 @@ if settings.light.engine == "transport":
             leaves=lambda wildcards: leaf_geometry(wildcards)[int(wildcards.placement)],
             wood=wood_mesh,
             sensors=results("sky/sensors.csv"),
+            model=results("light/model.json") if ADVISED else [],
             code=code("transport"),
         output:
             transport=results("light/transport/{reconstruction}_{placement}.nc"),
         log:
-            logs("transport_{reconstruction}_{placement}"),
+            logs("transport/{reconstruction}/{placement}"),
         benchmark:
-            benchmarks("transport_{reconstruction}_{placement}")
+            benchmarks("transport/{reconstruction}/{placement}")
         conda:
             "../envs/dapple.yaml"
         threads: 2
@@ -150,6 +152,7 @@ if settings.light.engine == "transport":
             sensors=results("sky/sensors.csv"),
             sky=results("sky/sky.nc"),
             optics=results("sky/optics.nc"),
+            model=results("light/model.json") if ADVISED else [],
             code=code("light"),
         output:
             light=results("light/{reconstruction}.nc"),

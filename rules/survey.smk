@@ -17,8 +17,9 @@ SURVEY = settings.survey
 REPLICATES = range(1, SURVEY.replicates + 1)
 STANDS = [(stand, replicate) for stand in SURVEY.stands for replicate in REPLICATES]
 SCANS = [(*stand, design) for stand in STANDS for design in SURVEY.designs]
-SCANNER = SURVEY.model_dump(
-    include={
+SCANNER = {
+    key: getattr(SURVEY, key)
+    for key in (
         "zenith_step_deg",
         "azimuth_steps_deg",
         "beam_divergence_mrad",
@@ -27,8 +28,8 @@ SCANNER = SURVEY.model_dump(
         "reflectance",
         "min_energy",
         "pulse_m",
-    }
-)
+    )
+}
 
 
 def stand_settings(wildcards):
@@ -104,15 +105,11 @@ rule survey_scan:
         stand=stand_settings,
         scanner=SCANNER,
         seed=lambda wildcards: stream("survey", "scan", *wildcards),
-        **SURVEY.model_dump(
-            include={
-                "positions_m",
-                "height_m",
-                "voxel_size_m",
-                "cell_size_m",
-                "density_step_deg",
-            }
-        ),
+        positions_m=SURVEY.positions_m,
+        height_m=SURVEY.height_m,
+        voxel_size_m=SURVEY.voxel_size_m,
+        cell_size_m=SURVEY.cell_size_m,
+        density_step_deg=SURVEY.density_step_deg,
     message:
         "{settings.experiment}: scan {wildcards.stand} stand {wildcards.replicate}, {wildcards.design}"
     script:
@@ -239,3 +236,63 @@ rule survey_plan:
         "{settings.experiment}: plan the next scans"
     script:
         "../scripts/survey_plan.py"
+
+
+rule survey_figures:
+    input:
+        shadowing=results("survey/shadowing.csv"),
+        filled=results("survey/filled_profile.csv"),
+        maps=results("survey/shadow_maps.npz"),
+        regression=results("survey/regression.csv"),
+        profile=results("survey/profile.csv"),
+        plan=results("survey/plan.csv"),
+        code=code("survey_figures"),
+    output:
+        shadowing=results("survey/shadowing.png"),
+        filled=results("survey/filled_profile.png"),
+        maps=results("survey/shadow_maps.png"),
+        regression=results("survey/regression.png"),
+        profile=results("survey/profile.png"),
+        plan=results("survey/plan.png"),
+    log:
+        logs("survey_figures"),
+    benchmark:
+        benchmarks("survey_figures")
+    conda:
+        "../envs/dapple.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        cell_size_m=SURVEY.cell_size_m,
+    message:
+        "{settings.experiment}: figures of the survey"
+    script:
+        "../scripts/survey_figures.py"
+
+
+rule survey_coverage:
+    input:
+        shots=results("scan/shots.parquet"),
+        code=code("survey_coverage"),
+    output:
+        classes=results("survey/coverage.csv"),
+        summary=results("survey/coverage.json"),
+    log:
+        logs("survey_coverage"),
+    benchmark:
+        benchmarks("survey_coverage")
+    conda:
+        "../envs/dapple.yaml"
+    threads: 2
+    resources:
+        mem_mb=4000,
+    params:
+        voxel_size_m=SURVEY.voxel_size_m,
+        cell_size_m=SURVEY.cell_size_m,
+        range_m=SURVEY.kriging_range_m,
+        neighbours=SURVEY.kriging_neighbours,
+    message:
+        "{settings.experiment}: how well the real scan covers its surroundings"
+    script:
+        "../scripts/survey_coverage.py"

@@ -1,7 +1,7 @@
 """PAR through the day: direct beam traced now, sky and scattered light from counted paths."""
 
-from dapple.formats import light, scenes, transport
-from dapple.light import direct, sensors, series, traced
+from dapple.formats import json, light, scenes, transport
+from dapple.light import pilot, sensors, series, traced
 from dapple.streams import stream_seed
 from dapple.workflow import run
 
@@ -10,14 +10,18 @@ def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
     sky, optics = light.read(inputs.sky), light.read_optics(inputs.optics)
     table = sensors.read_local(inputs.sensors)
+    advised = json.read(inputs.model) if inputs.model else {"bands": len(optics)}
+    model = pilot.Model(**advised)
+    sky, optics = pilot.simplified(sky, optics, model)
     placements = []
     for number, (leaves, counted) in enumerate(zip(inputs.leaves, inputs.transports, strict=True)):
         scene = scenes.read([leaves], inputs.wood, params.ground_z_m)[0]
         paths = transport.read(counted)
-        sunlit = direct.sunlit(
+        sunlit = pilot.sunlit(
             traced.load(scene, params.variant),
             table[["x_m", "y_m", "z_m"]].to_numpy(),
-            series.towards_sun(sky),
+            sky,
+            model,
             tolerance=series.DIRECT_SHARE * params.tolerance,
             max_rays=params.max_shadow_rays,
             n_replicates=paths.n_replicates,

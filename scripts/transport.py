@@ -1,6 +1,6 @@
 """Trace paths from the sensors once, for any sky, spectrum and time."""
 
-from dapple.formats import scenes
+from dapple.formats import json, scenes
 from dapple.formats import transport as files
 from dapple.light import sensors, series, traced, transport
 from dapple.optics.surfaces import scene_optics
@@ -11,6 +11,7 @@ def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
     scene = scenes.read([inputs.leaves], inputs.wood, params.ground_z_m)[0]
     table = sensors.read_local(inputs.sensors)
+    advised = json.read(inputs.model) if inputs.model else {}
     print(f"variant {params.variant}, {len(table)} sensors")
     counted = transport.collect(
         traced.load(scene, params.variant),
@@ -18,8 +19,8 @@ def main(snakemake):
         n_sky_rays=params.sky_rays,
         n_paths=params.paths,
         max_growth=params.max_growth,
-        n_patches=params.sky_patches,
-        max_orders=params.max_orders,
+        n_patches=advised.get("sky_patches", params.sky_patches),
+        max_orders=advised.get("max_orders", params.max_orders),
         tolerance=series.PATH_SHARE * params.tolerance,
         # Nominal spectra: the run's own may change without tracing again.
         optics=scene_optics(),

@@ -109,12 +109,18 @@ def test_two_independent_engines_agree_on_the_light(small_run, name):
 
 
 def test_every_job_leaves_a_log_and_a_benchmark(small_run):
-    logs = {path.stem for path in small_run.result("logs").glob("*.log")}
-    benchmarks = {path.stem for path in small_run.result("benchmarks").glob("*.tsv")}
+    logs, benchmarks = (
+        {str(path.relative_to(folder).with_suffix("")) for path in folder.rglob(f"*{suffix}")}
+        for folder, suffix in (
+            (small_run.result("logs"), ".log"),
+            (small_run.result("benchmarks"), ".tsv"),
+        )
+    )
     assert logs == benchmarks
     assert {"scan", "voxels_0.2", "light_truth", "page"} <= logs
-    steps = set(pd.read_csv(small_run.result("runtime.csv"))["step"])
-    assert {"scan", "voxels", "light", "statistics"} <= steps
+    cost = pd.read_csv(small_run.result("runtime.csv")).fillna({"reconstruction": ""})
+    steps = set(zip(cost["step"], cost["reconstruction"], strict=True))
+    assert {("scan", ""), ("voxels", "voxels_0.2"), ("transport", "truth")} <= steps
 
 
 def test_the_merged_configuration_stands_beside_the_results(small_run):

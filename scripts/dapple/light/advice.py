@@ -150,9 +150,7 @@ class Pilot:
             # One more than asked for: the first may compile kernels.
             for _ in range(self.repeats + 1)
         ][1:]
-        best = {
-            part: min((costs[part] for _, costs in runs), key=lambda c: c.wall_s) for part in PARTS
-        }
+        best = {part: pilot.least([costs[part] for _, costs in runs]) for part in PARTS}
         return runs[-1][0], best
 
     def difference(self, one: Light, other: Light) -> tuple[float, float]:
@@ -210,10 +208,9 @@ def model_effects(
         coarser = [level for level in levels if level != best and _is_coarser(level, best)]
         for level in coarser:
             found = one.light(scene, replace(one.finest, **{refinement: level}))
-            # Sun and patches move the rays; everything else looks at the same ones.
-            shared = refinement not in ("sun", "sky_patches")
+            # The seed makes models share their paths, so that their differences have no noise.
             effects.append(
-                one.effect(refinement, level, found, finest[0], truth=truth, shared=shared)
+                one.effect(refinement, level, found, finest[0], truth=truth, shared=True)
             )
         effects.append(one.effect(refinement, best, finest, finest[0], truth=truth, shared=True))
     return effects, finest[0]
@@ -267,19 +264,16 @@ def step_effects(
     effects = []
     for step in sorted(STEPS_MIN, reverse=True):
         known = minutes[::step]
-        cost = min(
-            (
-                pilot.timed(
-                    lambda known=known: direct.sunlit(scene, one.sensors_m, suns[known], **options)
-                )[1]
-                for _ in range(one.repeats)
-            ),
-            key=lambda c: c.wall_s,
-        )
+        runs = [
+            pilot.timed(
+                lambda known=known: direct.sunlit(scene, one.sensors_m, suns[known], **options)
+            )[1]
+            for _ in range(one.repeats)
+        ]
         between = np.array([np.interp(minutes, known, row[known]) for row in seen])
         error = (between - seen) * share_of_beam
         rmse, bias = float(np.sqrt((error**2).mean())), float(error.mean())
-        effects.append(Effect("step_min", step, rmse, bias, 0.0, {"direct": cost}))
+        effects.append(Effect("step_min", step, rmse, bias, 0.0, {"direct": pilot.least(runs)}))
     return effects
 
 

@@ -113,7 +113,7 @@ def collect(
     n_paths: int,
     max_orders: int,
     seed: int,
-    halved_after: int | None = 8,
+    halved_after: int | None = 16,
     n_replicates: int = 16,
 ) -> Received:
     """Trace paths from views and add up what they receive.

@@ -9,6 +9,14 @@ import numpy as np
 from dapple.light.advice import Effect
 from dapple.light.pilot import PARTS, Cost, Model
 
+SAVES = {
+    "sun": ("direct",),
+    "step_min": ("direct",),
+    "sky_patches": ("paths", "products"),
+    "max_orders": ("paths", "products"),
+    "bands": ("products",),
+}
+"""Which parts a refinement can make cheaper; what saves nothing (sky, ground) is never left out."""
 LEAST_SAVING = 0.05
 """Savings of less than this share are within the clock's scatter and count as none."""
 
@@ -50,20 +58,21 @@ class Scale:
 def predicted(effects: list[Effect], finest: Model, model: Model, scale: Scale) -> Cost:
     """What the whole run costs with a model, from the costs of its levels one at a time.
 
-    Each level makes a part cheaper by the factor by which it did so on the pilot.
+    Each level makes a part cheaper by the factor by which it did so on the pilot, in processor
+    time: others may be at work on the machine.
     """
     total = Cost()
     base = next(e for e in effects if e.refinement == "sun" and e.level == finest.sun)
     for part in PARTS:
         factor = getattr(scale, part)
         for refinement, own in _by_refinement(effects).items():
-            if refinement not in vars(model) or part not in next(iter(own.values())).parts:
+            if part not in SAVES.get(refinement, ()):
                 continue
             level, best = getattr(model, refinement), getattr(finest, refinement)
             if level != best:
                 # The run's own time step need not be one of those that were measured.
                 nearest = best if best in own else min(own, key=lambda x: abs(x - best))
-                ratio = own[level].parts[part].wall_s / own[nearest].parts[part].wall_s
+                ratio = own[level].parts[part].cpu_s / own[nearest].parts[part].cpu_s
                 factor *= ratio if ratio < 1 - LEAST_SAVING else 1.0
         total += base.parts[part] * factor
     return total
@@ -113,14 +122,14 @@ def choose(
         }
         | {getattr(finest, name): 0.0}
         for name, levels in _by_refinement(effects).items()
-        if name in vars(finest)
+        if name in SAVES
     }
     allowed = []
     for levels in product(*options.values()):
         left_out = sum(options[name][level] for name, level in zip(options, levels, strict=True))
         if left_out <= tolerance:
             model = replace(finest, **dict(zip(options, levels, strict=True)))
-            cost = predicted(effects, finest, model, scale).wall_s
+            cost = predicted(effects, finest, model, scale).cpu_s
             allowed.append((cost, left_out, model))
     # Of equal cost, the finer one.
     allowed.sort(key=lambda one: (one[0], one[1]))

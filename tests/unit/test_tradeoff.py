@@ -1,0 +1,98 @@
+"""The trade-off: what counts as the front, and a chart that needs nothing else."""
+
+import re
+
+import numpy as np
+import pytest
+
+from dapple.figures import style
+from dapple.figures import tradeoff as chart
+from dapple.stats import tradeoff
+
+
+def row(cost, error, **facts):
+    return {
+        "setting": f"{cost} s",
+        "reconstruction": "polygons",
+        "size_m": 0.05,
+        "cost_s": cost,
+        "cpu_s": cost,
+        "compile_s": 0.0,
+        "error_rel": error,
+        "error_finest_rel": error / 2,
+        "reference": "truth",
+        "engine": "transport",
+        "sky_patches": 577,
+        "max_orders": 12,
+        "n_sensors": 10,
+        "n_times": 36,
+    } | facts
+
+
+def test_the_front_is_what_no_other_point_beats_in_both():
+    rng = np.random.default_rng(1)
+    cost, error = rng.random((2, 200))
+    beaten = ((cost[:, None] > cost) & (error[:, None] > error)).any(axis=1)
+    assert (tradeoff.front(cost, error) == ~beaten).all()
+
+
+def test_of_equal_points_one_is_on_the_front_and_a_point_without_error_never():
+    assert tradeoff.front([1, 1, 2], [0.1, 0.1, 0.1]).sum() == 1
+    assert not tradeoff.front([0.5, 1], [np.nan, 0.1])[0]
+
+
+def test_the_table_lists_the_cheapest_first_and_begins_as_others_rely_on():
+    table = tradeoff.table([row(2.0, 0.1), row(1.0, 0.3), row(3.0, 0.2)])
+    assert list(table.columns[:5]) == [
+        "setting",
+        "reconstruction",
+        "cost_s",
+        "error_rel",
+        "on_front",
+    ]
+    assert list(table["cost_s"]) == [1.0, 2.0, 3.0]
+    assert list(table["on_front"]) == [True, True, False]
+
+
+def test_an_error_is_relative_to_the_open_sky_of_its_own_time_and_the_night_does_not_count():
+    open_sky = np.array([1000.0, 100.0, 0.0])
+    reference = np.zeros((2, 3))
+    par = np.array([[100.0, 10.0, 5.0], [-100.0, -10.0, 5.0]])
+    assert tradeoff.rmse_rel(par, reference, open_sky) == pytest.approx(0.1)
+
+
+@pytest.fixture
+def points():
+    rows = [row(10.0**k, 0.3 / 2**k, paths=4**k) for k in range(4)]
+    rows += [row(0.5, 0.4, sky_patches=1)]
+    rows += [row(9.0, 0.2, engine="timestep", sky_patches=None, paths=64)]
+    rows += [row(2.0, 0.15, reconstruction="voxels_0.2", size_m=0.2)]
+    return tradeoff.table(rows)
+
+
+def test_the_page_is_one_file_that_asks_for_no_other(points):
+    page = chart.page(points, "mine")
+    assert not re.search(r"<(?:script|link|img)[^>]+(?:src|href)=.https?:", page)
+    assert "Plotly.newPlot" in page
+    assert "Pareto front" in page
+    assert page == chart.page(points, "mine")
+
+
+def test_both_charts_say_that_published_times_are_another_machines(points):
+    note = chart.published_note(points)
+    assert "Another machine" in note
+    assert "5.5 s (polygons), 7.8 s (voxels 1.0 m), 217 s (voxels 0.2 m)" in note
+    # 360 pairs of 5.5 s are 0.55 hours
+    assert "0.55 / 0.78 / 22 h for these 360 pairs" in note
+    figure = chart.draw(points)
+    assert note in [text.get_text() for text in figure.texts]
+    assert "Another machine" in chart.page(points, "mine")
+
+
+def test_the_chart_has_logarithmic_axes_and_names_every_geometry(points, tmp_path):
+    figure = chart.draw(points)
+    for axes in figure.axes:
+        assert axes.get_xscale() == axes.get_yscale() == "log"
+        assert {"polygons 5 cm", "voxels 0.2 m"} <= {text.get_text() for text in axes.texts}
+    style.save(figure, tmp_path / "chart.png")
+    assert (tmp_path / "chart.png").stat().st_size > 0
