@@ -10,7 +10,9 @@ Makes   survey/{stand}_{replicate}/truth.nc          leaf and wood area of every
         survey/regression.csv, profile.csv, ...      contact frequency and its correction
         survey/plan.csv, positions.csv               the planner's positions against designs
         survey/*.png                                 figures
-        survey/coverage.csv                          coverage classes of a real scan
+        survey/variants.csv                          on request: other leaves, beams and rules
+        survey/next.csv                             on request: where to scan next
+        survey/coverage.csv                          on request: coverage classes of a real scan
 """
 
 SURVEY = settings.survey
@@ -31,18 +33,41 @@ SCANNER = {
     )
 }
 
+if SURVEY.enabled:
+    from dapple.survey.checks import check
 
-def stand_settings(wildcards):
+    try:
+        check(
+            stands=SURVEY.stands,
+            leaf_area_index=SURVEY.leaf_area_index,
+            volume_m=SURVEY.volume_m,
+            voxel_size_m=SURVEY.voxel_size_m,
+            cell_size_m=SURVEY.cell_size_m,
+            design_names=SURVEY.designs,
+            positions_m=SURVEY.positions_m,
+            height_m=SURVEY.height_m,
+            density_step_deg=SURVEY.density_step_deg,
+            scanner=SCANNER,
+        )
+    except InputError as error:
+        sys.exit(f"dapple: {error}")
+
+
+def grown(stand, replicate):
     """What a stand is grown from."""
+    leaf_area_index = dict(zip(SURVEY.stands, SURVEY.leaf_area_index))
     return {
         "positions_m": SURVEY.trees_m,
         "size_m": SURVEY.volume_m,
-        "leaf_area_index": dict(zip(SURVEY.stands, SURVEY.leaf_area_index))[
-            wildcards.stand
-        ],
+        "leaf_area_index": leaf_area_index[stand],
         "n_grown": SURVEY.grown,
-        "seed": stream("survey", wildcards.replicate),
+        "seed": stream("survey", replicate),
     }
+
+
+def stand_settings(wildcards):
+    """What the stand of a job is grown from."""
+    return grown(wildcards.stand, wildcards.replicate)
 
 
 def survey_files(name, runs):
@@ -296,3 +321,60 @@ rule survey_coverage:
         "{settings.experiment}: how well the real scan covers its surroundings"
     script:
         "../scripts/survey_coverage.py"
+
+
+rule survey_variants:
+    input:
+        code=code("survey_variants"),
+    output:
+        variants=results("survey/variants.csv"),
+    log:
+        logs("survey_variants"),
+    benchmark:
+        benchmarks("survey_variants")
+    conda:
+        "../envs/dapple.yaml"
+    threads: 2
+    resources:
+        mem_mb=3000,
+    params:
+        stands={stand: grown(stand, 1) for stand in SURVEY.stands},
+        scanner=SCANNER | {"azimuth_steps_deg": (0.5, 0.1)},
+        height_m=SURVEY.height_m,
+        voxel_size_m=SURVEY.voxel_size_m,
+        cell_size_m=SURVEY.cell_size_m,
+        seed=stream("survey", "variants"),
+    message:
+        "{settings.experiment}: what makes shadow"
+    script:
+        "../scripts/survey_variants.py"
+
+
+rule survey_next:
+    input:
+        voxels=results("structure/voxels_1.0/voxels.nc"),
+        shots=results("scan/shots.parquet"),
+        code=code("survey_next"),
+    output:
+        next=results("survey/next.csv"),
+    log:
+        logs("survey_next"),
+    benchmark:
+        benchmarks("survey_next")
+    conda:
+        "../envs/dapple.yaml"
+    threads: 2
+    resources:
+        mem_mb=2000,
+    params:
+        along=SURVEY.candidates,
+        scans=SURVEY.plan_scans,
+        voxel_size_m=SURVEY.voxel_size_m,
+        zenith_step_deg=SURVEY.zenith_step_deg,
+        azimuth_step_deg=max(SURVEY.azimuth_steps_deg),
+        range_m=SURVEY.kriging_range_m,
+        neighbours=SURVEY.kriging_neighbours,
+    message:
+        "{settings.experiment}: where to scan next"
+    script:
+        "../scripts/survey_next.py"

@@ -68,6 +68,7 @@ def main(snakemake):
     }
     facts = {
         "tolerance": params.tolerance,
+        "run_step_min": step_min,
         "chosen": found.model.as_dict(),
         "left_out_rel": found.effects_rel,
         "measured_rel": found.measured_rel,
@@ -149,6 +150,7 @@ def notes(params, inputs, effects):
         found.append("no shots, so that no voxels")
     if not inputs.truth:
         found.append("the truth is not known")
+    found.append("steps up to run_step_min are no choice: those times are traced anyway")
     if not any(effect.refinement == "step_min" for effect in effects):
         found.append("the series is shorter than the longest time step: no time steps compared")
     return found

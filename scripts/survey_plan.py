@@ -47,9 +47,16 @@ def main(snakemake):
         for name, several in orders.items():
             measured = np.mean([plan.measured_rs(seen, order) for order in several], axis=0)
             for k, rs in enumerate(measured):
-                rows.append({"stand": stand, "seed": seed, "planner": name, "n_scans": k + 1,
-                             "rs": rs,
-                             "expected_rs": expected[k] if name == "planner" else np.nan})  # fmt: skip
+                rows.append(
+                    {
+                        "stand": stand,
+                        "seed": seed,
+                        "planner": name,
+                        "n_scans": k + 1,
+                        "rs": rs,
+                        "expected_rs": expected[k] if name == "planner" else np.nan,
+                    }
+                )
         for k, at in enumerate(orders["planner"][0]):
             x_m, y_m, z_m = positions_m[at]
             places.append({"stand": stand, "seed": seed, "scan": k + 1,

@@ -32,9 +32,7 @@ def main(snakemake):
         world = hemisphere.world_of(stand)
         for number, position_m in enumerate(positions_m):
             seed = stream_seed(settings["seed"], snakemake.wildcards.design, number)
-            for beams in hemisphere.scan(
-                world, stand, position_m, scanner, len(positions_m), seed
-            ):
+            for beams in hemisphere.scan(world, stand, position_m, scanner, len(positions_m), seed):
                 reach.add(beams)
                 if (beams.bits >> bit & 1).any():
                     yield beams.shots(bit, number + 1)

@@ -24,9 +24,8 @@ def main(snakemake):
         for bit, n in enumerate(n_beams):
             found = attribute(reach.hit.values, reach.passed.values, bit)
             shares = shadow.relative_shadow(found, filled)
-            rows.append({"stand": stand, "design": design, "n_beams": int(n),
-                         "rs": shares["rs"], "seed": seed,
-                         "not_hit": shares["not_hit"], "false_hits": shares["false_hits"]})  # fmt: skip
+            row = {"stand": stand, "design": design, "n_beams": int(n)}
+            rows.append(row | {"rs": shares.pop("rs"), "seed": seed} | shares)
             profile = pd.DataFrame(shadow.filled_profile(found, filled))
             height = (np.arange(len(profile)) + 0.5) * reach.attrs["voxel_size_m"]
             profiles.append(

@@ -13,7 +13,9 @@ def main(snakemake):
         f"{name}_area_m2": stands.area_in_voxels(stand, part, size_m)
         for name, part in (("leaf", "leaves"), ("wood", "wood"))
     }
-    print(f"leaf area index {areas['leaf_area_m2'].sum() / (stand.size_m[0] * stand.size_m[1]):.4f}")
+    print(
+        f"leaf area index {areas['leaf_area_m2'].sum() / (stand.size_m[0] * stand.size_m[1]):.4f}"
+    )
     survey.write(snakemake.output.truth, areas, voxel_size_m=size_m)
 
 

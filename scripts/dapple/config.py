@@ -11,14 +11,7 @@ from math import sqrt
 from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Gt, Le
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    ValidationError,
-    model_validator,
-)
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from dapple import config_checks
 
@@ -358,6 +351,7 @@ class Tradeoff(Section):
 
     sensors: Count = _(24, "sensors of every run")
     times: Count = _(21, "times of every run")
+    repeats: Count = _(2, "runs of every setting, of which the shortest counts as its cost")
     paths: tuple[Count, ...] = _(
         (256, 1024, 4096, 16_384), "paths, and rays to the sky, of every sensor"
     )
@@ -422,12 +416,6 @@ class Survey(Section):
     plan_scans: Annotated[int, Ge(2), Le(12)] = _(6, "planner: largest number of scans")
     kriging_range_m: Positive = _(2.0, "distance over which density is alike, for the fill")
     kriging_neighbours: Annotated[int, Ge(3), Le(64)] = _(16, "known cells that fill a cell")
-
-    @model_validator(mode="after")
-    def _each_stand_has_its_leaves(self) -> Survey:
-        if len(self.stands) != len(self.leaf_area_index) or not self.stands:
-            raise ValueError("as many values of leaf_area_index as there are stands, at least one")
-        return self
 
 
 class Tools(Section):

@@ -2,12 +2,13 @@
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
 from dapple.figures import style
 
 NAMES = {
     "sun": "sun as a {}",
-    "sky_patches": "{} sky patches",
+    "sky_patches": "sky patches: {}",
     "sky": "{} sky",
     "max_orders": "scattering orders: {}",
     "ground": "{} ground",
@@ -38,7 +39,7 @@ def draw(facts: dict) -> Figure:
         effects.plot([SMALLEST, effect], [place, place], color=colour, linewidth=1)
         effects.plot([effect], [place], "o", color=colour, markersize=5)
         effects.annotate(
-            f"{effect:.1%}" if effect >= 0.0005 else "< 0.05 %",
+            f"{100 * effect:.2g} %",
             (effect, place),
             xytext=(6, 0),
             textcoords="offset points",
@@ -46,7 +47,7 @@ def draw(facts: dict) -> Figure:
             fontsize=7.5,
         )
         costs.barh(place, cost, color=colour, height=0.6)
-        costs.text(cost + 0.02, place, f"{cost:.0%}", va="center", fontsize=7.5)
+        costs.text(cost + 0.02, place, f"{100 * cost:.0f} %", va="center", fontsize=7.5)
     effects.axvline(facts["tolerance"], color="#222222", linewidth=0.8, linestyle=(0, (4, 3)))
     effects.text(facts["tolerance"], len(rows) - 0.3, " tolerance", fontsize=7.5, ha="left")
     effects.set(
@@ -55,9 +56,10 @@ def draw(facts: dict) -> Figure:
         ylim=(-0.7, len(rows) + 0.3),
         xlabel="change of PAR against the finest, share of open-sky PAR (RMSE)",
     )
+    effects.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:g} %"))
     effects.set_yticks(range(len(rows)), [row[0] for row in reversed(rows)])
     costs.axvline(1, color="#222222", linewidth=0.8)
-    costs.set(xlabel="wall time, share of the finest's", xlim=(0, None))
+    costs.set(xlabel="processor time, share of the finest's", xlim=(0, None))
     costs.grid(axis="y", visible=False)
     _legend(effects)
     return figure
@@ -72,19 +74,21 @@ def _rows(facts: dict):
             for one in levels:
                 if one is finest:
                     continue
-                colour = GEOMETRY if group == "geometry" else KEPT
-                if group == "refinements" and one["level"] == chosen:
-                    colour = LEFT_OUT
+                no_choice = group == "geometry" or (
+                    name == "step_min" and one["level"] <= facts["run_step_min"]
+                )
+                colour = LEFT_OUT if one["level"] == chosen else KEPT
+                colour = GEOMETRY if no_choice else colour
                 effect = max(one["effect_rel"], SMALLEST)
                 label = NAMES[name].format(one["level"])
-                yield label, colour, effect, one["wall_s"] / finest["wall_s"]
+                yield label, colour, effect, one["cpu_s"] / finest["cpu_s"]
 
 
 def _legend(axes: Axes) -> None:
     for colour, label in (
         (LEFT_OUT, "advised"),
         (KEPT, "too coarse, or saves nothing"),
-        (GEOMETRY, "geometry: measured, not chosen"),
+        (GEOMETRY, "not a choice: geometry, the series' own times"),
     ):
         axes.plot([], [], "o-", color=colour, markersize=5, linewidth=1, label=label)
     axes.legend(loc="upper center", bbox_to_anchor=(0.6, 1.09), ncols=3, fontsize=7.5)

@@ -5,6 +5,7 @@ import pandas as pd
 import plotly.graph_objects as go
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from plotly.subplots import make_subplots
 
 from dapple.figures import style
@@ -17,6 +18,8 @@ VOXEL_SHADES = ("#7A5C00", "#E69F00", "#D55E00", "#CC79A7")
 FRONT_COLOUR = "#1A1A1A"
 LABEL_GAP = 0.045
 """Least distance of labels, as a share of the panel's height."""
+LABEL_WIDTH, LABEL_SHIFT = 0.18, 0.03
+"""Of a label, and from its point: shares of the panel's width."""
 
 
 def groups(points: pd.DataFrame) -> list[tuple[str, str, str, pd.DataFrame]]:
@@ -42,7 +45,7 @@ def published_note(points: pd.DataFrame) -> str:
     )
     hours = " / ".join(f"{seconds * pairs / 3600:.2g}" for seconds in PUBLISHED_S.values())
     return (
-        f"Another machine, for orientation: LESS took {runs} for one sensor at one time "
+        f"Another machine, for orientation: LESS took {runs} for one sensor at one time\n"
         f"(Frey et al. 2025, 66,000 runs); {hours} h for these {pairs:,} pairs."
     )
 
@@ -81,12 +84,17 @@ def draw(points: pd.DataFrame) -> Figure:
         axes.set_xlabel(_cost_title(points))
     panels[0].set_ylabel(ERROR_TITLE)
     _legend(panels[1])
-    figure.text(0.005, -0.045, published_note(points), fontsize=7.5, color="#444444")
+    figure.get_layout_engine().set(rect=(0, 0.07, 1, 0.93))
+    figure.text(0.01, 0.01, published_note(points), fontsize=7.5, color="#444444")
     return figure
 
 
 def _panel(axes: Axes, points: pd.DataFrame, error: str) -> None:
     axes.set(xscale="log", yscale="log")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1, 1.5, 2, 3, 5, 7)))
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:g} %"))
     labels = []
     for label, colour, engine, own in groups(points):
         ladder = _ladder(own)
@@ -107,11 +115,14 @@ def _panel(axes: Axes, points: pd.DataFrame, error: str) -> None:
     axes.plot(best["cost_s"], best[error], color=FRONT_COLOUR, linewidth=0.8, linestyle=(0, (4, 2)))
     low, high = axes.get_xlim()
     axes.set_xlim(low, high * (high / low) ** 0.33)
-    _label(axes, labels)
+    low, high = axes.get_ylim()
+    axes.set_ylim(low / (high / low) ** 0.18, high)
+    _label(axes, labels, points[["cost_s", error]].to_numpy())
 
 
 def _ladder(own: pd.DataFrame) -> pd.DataFrame:
     """Points that differ in their number of rays alone: with the most patches and orders."""
+    own = own.sort_values("paths")
     if own["engine"].iloc[0] == "timestep":
         return own
     finest = own[["sky_patches", "max_orders"]].max()
@@ -120,20 +131,27 @@ def _ladder(own: pd.DataFrame) -> pd.DataFrame:
     ]
 
 
-def _label(axes: Axes, labels: list[tuple[str, str, float, float]]) -> None:
-    """Names at the dear end of every ladder, moved apart where they would overlap."""
+def _label(axes: Axes, labels: list[tuple[str, str, float, float]], points: np.ndarray) -> None:
+    """Names at the dear end of every ladder, moved down to where nothing else is."""
     to_axes = axes.transData + axes.transAxes.inverted()
+    taken = to_axes.transform(points)
     placed = []
-    for label, colour, cost, error in sorted(labels, key=lambda one: one[3]):
+    for label, colour, cost, error in sorted(labels, key=lambda one: -one[3]):
         x, y = to_axes.transform((cost, error))
-        near = [other for other in placed if abs(other[2] - x) < 0.3]
-        lowest = max((other[3] + LABEL_GAP for other in near), default=-np.inf)
-        placed.append((label, colour, x, max(y, lowest), cost, error))
+        x += LABEL_SHIFT
+        right = x + LABEL_WIDTH
+        while (
+            (taken[:, 0] > x) & (taken[:, 0] < right) & (abs(taken[:, 1] - y) < LABEL_GAP / 2)
+        ).any() or any(
+            abs(other[2] - x) < LABEL_WIDTH and abs(other[3] - y) < LABEL_GAP for other in placed
+        ):
+            y -= LABEL_GAP / 4
+        placed.append((label, colour, x, y, cost, error))
     for label, colour, x, y, cost, error in placed:
         axes.annotate(
             label,
             (cost, error),
-            xytext=(x + 0.03, y),
+            xytext=(x, y),
             textcoords=axes.transAxes,
             va="center",
             fontsize=7.5,
@@ -203,7 +221,7 @@ def page(points: pd.DataFrame, title: str) -> str:
         figure.update_yaxes(type="log", tickformat=".2~%", row=1, col=column)
     figure.update_yaxes(title_text=ERROR_TITLE, row=1, col=1)
     figure.add_annotation(
-        text=published_note(points),
+        text=published_note(points).replace("\n", " "),
         xref="paper",
         yref="paper",
         x=0,

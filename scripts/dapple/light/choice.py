@@ -17,8 +17,8 @@ SAVES = {
     "bands": ("products",),
 }
 """Which parts a refinement can make cheaper; what saves nothing (sky, ground) is never left out."""
-LEAST_SAVING = 0.05
-"""Savings of less than this share are within the clock's scatter and count as none."""
+LEAST_SAVING = 0.1
+"""Savings of less than this share are within the clock's scatter and not worth an error."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def predicted(effects: list[Effect], finest: Model, model: Model, scale: Scale) 
                 # The run's own time step need not be one of those that were measured.
                 nearest = best if best in own else min(own, key=lambda x: abs(x - best))
                 ratio = own[level].parts[part].cpu_s / own[nearest].parts[part].cpu_s
-                factor *= ratio if ratio < 1 - LEAST_SAVING else 1.0
+                factor *= min(ratio, 1.0)
         total += base.parts[part] * factor
     return total
 
@@ -94,6 +94,8 @@ def choose(
     measure: Callable[[Model], float],
 ) -> Choice:
     """The cheapest model whose left-out effects add up to no more than the tolerance.
+
+    Of models that cost nearly the same the one that leaves out least is taken.
 
     Parameters
     ----------
@@ -131,9 +133,11 @@ def choose(
             model = replace(finest, **dict(zip(options, levels, strict=True)))
             cost = predicted(effects, finest, model, scale).cpu_s
             allowed.append((cost, left_out, model))
-    # Of equal cost, the finer one.
-    allowed.sort(key=lambda one: (one[0], one[1]))
-    for _, left_out, model in allowed:
+    while allowed:
+        dearest = min(cost for cost, _, _ in allowed) / (1 - LEAST_SAVING)
+        near = [one for one in allowed if one[0] <= dearest]
+        _, left_out, model = best = min(near, key=lambda one: (one[1], one[0]))
+        allowed.remove(best)
         steps = options.get("step_min", {}).get(model.step_min, 0.0)
         measured = float(np.hypot(measure(model), steps))
         if measured <= tolerance or model == finest:

@@ -14,6 +14,8 @@ from dapple.light.scene import Optics
 from dapple.light.sky import patch_radiance
 from dapple.light.tensor import Transport, straight, summed_scattered, sun_radiance
 
+VALUES_AT_ONCE = 1 << 22
+"""Bounds memory: values of sensors, replicates and times that are held together."""
 PARTS = {
     "par_umol_m2_s": "photosynthetically active radiation",
     "par_direct_umol_m2_s": "PAR straight from the sun",
@@ -97,8 +99,30 @@ def compute(
     -------
     Light
     """
+    n_times = sky.sizes["time"]
+    step = int(np.clip(VALUES_AT_ONCE // transport.sky_seen[..., 0].size, 1, n_times))
+    blocks = [
+        _from_sky(transport, sky.isel(time=slice(low, low + step)), optics, sun_kernel_deg)
+        for low in range(0, n_times, step)
+    ]
+    from_sky, scattered, variance = (
+        np.concatenate(part, axis=1) for part in zip(*blocks, strict=True)
+    )
+    beam = level_beam(sky)
+    # Shadow rays and paths are drawn independently: their variances add.
+    return Light(
+        direct=sunlit.share.mean(axis=0) * beam,
+        sky=from_sky,
+        scattered=scattered,
+        standard_error=np.sqrt(variance + (sunlit.standard_error * beam) ** 2),
+    )
+
+
+def _from_sky(
+    transport: Transport, sky: xr.Dataset, optics: Optics, sun_kernel_deg: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Light straight from the sky, scattered light, the variance of their sum: (n, t) each."""
     subdivision = patches(transport.n_patches)
-    sun = towards_sun(sky)
     beam = sky["beam_normal_umol_m2_s"].transpose("time", "band").to_numpy()
     diffuse = sky["diffuse_horizontal_umol_m2_s"].transpose("time", "band").to_numpy()
     radiance = patch_radiance(
@@ -107,19 +131,13 @@ def compute(
         sky["sun_azimuth_deg"].to_numpy(),
         subdivision,
     )
-    spread = sun_radiance(sun, subdivision, kernel_deg=sun_kernel_deg)
+    spread = sun_radiance(towards_sun(sky), subdivision, kernel_deg=sun_kernel_deg)
     from_sky = straight(transport, radiance) * diffuse.sum(axis=1)
-    scattered = summed_scattered(transport, radiance, diffuse, optics)
-    scattered += summed_scattered(transport, spread, beam, optics)
-    straight_beam = level_beam(sky)
-    # Shadow rays and paths are drawn independently: their variances add.
+    both = np.concatenate([radiance, spread]), np.concatenate([diffuse, beam])
+    scattered = summed_scattered(transport, *both, optics)
+    scattered = scattered[..., : len(beam)] + scattered[..., len(beam) :]
     variance = (from_sky + scattered).var(axis=1, ddof=1) / transport.n_replicates
-    return Light(
-        direct=sunlit.share.mean(axis=0) * straight_beam,
-        sky=from_sky.mean(axis=1),
-        scattered=scattered.mean(axis=1),
-        standard_error=np.sqrt(variance + (sunlit.standard_error * straight_beam) ** 2),
-    )
+    return from_sky.mean(axis=1), scattered.mean(axis=1), variance
 
 
 def summarise(placements: list[Light], sensors: list[str], sky: xr.Dataset) -> xr.Dataset:

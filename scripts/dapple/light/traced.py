@@ -15,6 +15,8 @@ from dapple.light.scene import MESH_KINDS, Scene
 RAY_OFFSET = 1e-6
 """How far a scattered ray starts from its surface, as a share of the scene's largest coordinate."""
 LEAST_EXTENT_M = 10.0
+LEAST_SLOPE = 1e-6
+"""Of a ray in a repeated cell: a level one would go on for ever. One in a million is lost."""
 
 
 class TracedScene:
@@ -167,7 +169,8 @@ class TracedScene:
         ]
         # A ray that starts on a side and leaves the cell has gone round it by rounding: it crosses.
         side = dr.maximum(dr.minimum(*ends), 0)
-        return dr.select((direction.z > 0) & (origin.z > self.top_z), dr.inf, side)
+        free = (direction.z > 0) & (origin.z > self.top_z)
+        return dr.select(free | (dr.abs(direction.z) < LEAST_SLOPE), dr.inf, side)
 
     def _wrapped(self, point, direction, crossed):
         """Points on a side of the cell, put on the opposite side."""

@@ -31,8 +31,8 @@ def factor_table(cells: Runs) -> pd.DataFrame:
             for quantity in correction.QUANTITIES
         }
         for number, name in enumerate((*correction.CLASSES, "never")):
-            rows.append({"stand": stand, "design": design, "coverage_class": name}
-                        | {f"factor_{key}": values[number] for key, values in factors.items()})  # fmt: skip
+            row = {"stand": stand, "design": design, "coverage_class": name}
+            rows.append(row | {f"factor_{key}": values[number] for key, values in factors.items()})
     return pd.DataFrame(rows)
 
 
@@ -153,7 +153,5 @@ def _pairs(cells: Runs) -> list[tuple[str, str]]:
 def _some(cells: Runs, stand: str, design: str, without: int | None = None) -> list[Cells]:
     """Cells of a stand and design, of all seeds but one."""
     return [
-        one
-        for (s, seed, d), one in cells.items()
-        if s == stand and d == design and seed != without
+        one for (s, seed, d), one in cells.items() if s == stand and d == design and seed != without
     ]

@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit, prange
 
 from dapple.errors import InputError
-from dapple.survey.designs import positions
+from dapple.survey.designs import candidates, positions
 
 
 def chance_of_seeing(
@@ -203,3 +203,37 @@ def orders(
     others = np.setdiff1d(np.arange(len(positions_m)), [centre])
     drawn = [[centre, *map(int, rng.permutation(others)[: n - 1])] for _ in range(n_random)]
     return {"planner": [order], **by_design, "random": drawn}, expected
+
+
+def places(
+    density_m2_m3: np.ndarray,
+    cell_size_m: float,
+    scanned_m: np.ndarray,
+    along: int,
+    densest_m2_m3: float = 1.0,
+) -> np.ndarray:
+    """Places of scans that there are, then a grid of free ones at their mean height.
+
+    Parameters
+    ----------
+    density_m2_m3 : (nx, ny, nz) float64
+        Estimated density; the grid's corner is the origin.
+    cell_size_m : float
+        Edge of a cell [m].
+    scanned_m : (k, 3) float64
+        Positions of the scans [m].
+    along : int
+        Places along each edge.
+    densest_m2_m3 : float
+        No scanner is put into a cell with more.
+
+    Returns
+    -------
+    (k + n, 3) float64
+    """
+    size_m = np.array(density_m2_m3.shape) * cell_size_m
+    grid_m = candidates(size_m, float(scanned_m[:, 2].mean()), along)
+    index = np.clip((grid_m / cell_size_m).astype(int), 0, np.array(density_m2_m3.shape) - 1)
+    free = density_m2_m3[tuple(index.T)] <= densest_m2_m3
+    apart = np.linalg.norm(grid_m[:, None, :2] - scanned_m[None, :, :2], axis=-1).min(axis=1)
+    return np.concatenate([scanned_m, grid_m[free & (apart > cell_size_m)]])

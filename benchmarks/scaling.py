@@ -1,0 +1,146 @@
+"""How time and memory grow with triangles, sensors and timesteps.
+
+    PYTHONPATH=scripts python benchmarks/scaling.py OUTPUT [--largest N]
+
+Each point is a process of its own: a synthetic tree in memory, then everything from handing it to
+Mitsuba to the light of all sensors and times, with a fixed number of rays. Writes `scaling.csv` and
+`scaling.png`. Memory is what the engine takes on top of the geometry that it is given.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
+
+import crown
+
+from dapple.light import direct, series, traced, transport
+
+BASE = {"triangles": 350_000, "sensors": 72, "times": 30, "trees": 1}
+AXES = {
+    "triangles": (10_000, 31_623, 100_000, 316_228, 1_000_000, 3_162_278, 10_000_000),
+    "sensors": (10, 32, 100, 316, 1000, 3162, 10_000),
+    "times": (10, 32, 100, 316, 1000, 3162, 10_000),
+    "trees": (1, 10, 100),
+}
+SPACING_M = 8.0
+"""Of the trees of a stand."""
+STEPS = ("build_s", "direct_s", "paths_s", "bands_s")
+
+
+def memory_mb(field: str) -> float:
+    """A line of the kernel's account of this process, in MB."""
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith(field):
+            return float(line.split()[1]) / 1024
+    raise ValueError(field)
+
+
+def point(triangles: int, sensors: int, times: int, trees: int, variant: str) -> dict[str, float]:
+    """Time and memory of one case."""
+    # The first scene loads the back end and compiles the kernels.
+    tiny = traced.load(crown.scene("polygons", 1000), variant)
+    run(tiny, 4, 4)
+    del tiny
+    scene = crown.scene("polygons", triangles)
+    places = None
+    if trees > 1:
+        side = int(np.ceil(np.sqrt(trees)))
+        place = np.arange(trees)
+        places = SPACING_M * np.stack([place % side, place // side, 0 * place], axis=1)
+    before = memory_mb("VmRSS")
+    Path("/proc/self/clear_refs").write_text("5")  # forgets the peak so far
+    begin = time.perf_counter()
+    loaded = traced.load(scene, variant, places_m=places)
+    build = time.perf_counter() - begin
+    seconds = run(loaded, sensors, times)
+    return {
+        **dict(zip(STEPS, [build, *seconds], strict=True)),
+        "engine_mb": memory_mb("VmHWM") - before,
+        "geometry_mb": before,
+    }
+
+
+def run(scene: traced.TracedScene, n_sensors: int, n_times: int) -> np.ndarray:
+    """Seconds of shadow rays, of paths, and of the product with all bands."""
+    sensors, sky = crown.sensors(n_sensors), crown.sky(n_times)
+    clock = [time.perf_counter()]
+    suns = series.towards_sun(sky)
+    sunlit = direct.sunlit(scene, sensors, suns, tolerance=1.0, max_rays=256, seed=1)
+    clock.append(time.perf_counter())
+    counted = transport.collect(scene, sensors, n_paths=1024, n_patches=577, max_orders=30, seed=2)
+    clock.append(time.perf_counter())
+    series.compute(sunlit, counted, sky, crown.optics(), sun_kernel_deg=8.0)
+    clock.append(time.perf_counter())
+    return np.diff(clock)
+
+
+def draw(table: pd.DataFrame, path: Path) -> None:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    axes_names = [name for name in AXES if (table["axis"] == name).sum() > 1]
+    figure, axes = plt.subplots(
+        2, len(axes_names), figsize=(3.2 * len(axes_names), 5.6), sharey="row", sharex="col",
+        constrained_layout=True, squeeze=False,
+    )  # fmt: skip
+    labels = {
+        "build_s": "tree for rays",
+        "direct_s": "sun",
+        "paths_s": "sky and paths",
+        "bands_s": "bands",
+    }
+    for column, name in enumerate(axes_names):
+        part = table[table["axis"] == name]
+        for step in STEPS:
+            axes[0, column].loglog(part["value"], part[step], marker=".", label=labels[step])
+        axes[1, column].loglog(part["value"], part["engine_mb"], marker=".", color="0.3")
+        axes[1, column].set_xlabel(name)
+    axes[0, 0].set_ylabel("time [s]")
+    axes[1, 0].set_ylabel("memory of the engine [MB]")
+    axes[0, 0].legend(fontsize="small")
+    figure.savefig(path, dpi=150)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("output", nargs="?", type=Path)
+    parser.add_argument("--largest", type=int, default=10_000_000, help="most triangles")
+    parser.add_argument("--variant", default="llvm_ad_rgb")
+    parser.add_argument("--point", type=json.loads, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.point:
+        print(json.dumps(point(**options.point, variant=options.variant)))
+        return
+    rows = []
+    for name, values in AXES.items():
+        for value in values:
+            case = BASE | {name: value}
+            if case["triangles"] > options.largest:
+                continue
+            command = [sys.executable, __file__, "--point", json.dumps(case)]
+            command += ["--variant", options.variant]
+            done = subprocess.run(command, check=True, capture_output=True, text=True)
+            rows.append({"axis": name, "value": value} | json.loads(done.stdout.splitlines()[-1]))
+            print(rows[-1], flush=True)
+    table = pd.DataFrame(rows)
+    many = table[table["axis"] == "triangles"]
+    slope = np.polyfit(many["value"], many["engine_mb"], 1)[0] * 1024**2
+    options.output.mkdir(parents=True, exist_ok=True)
+    table.to_csv(options.output / "scaling.csv", index=False, float_format="%.4g")
+    draw(table, options.output / "scaling.png")
+    print(table.to_string(index=False, float_format=lambda value: f"{value:.4g}"))
+    print(f"{slope:.0f} bytes a triangle")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,73 @@
+"""What makes shadow: the same stands with other leaves, beams and rules for voxels."""
+
+import dataclasses
+
+import numpy as np
+import pandas as pd
+
+from dapple.formats.atomic import atomic
+from dapple.streams import stream_seed
+from dapple.survey import correction, designs, hemisphere, shadow
+from dapple.survey.reach import Reach, attribute
+from dapple.virtual import stands
+from dapple.workflow import options, run
+
+LARGE = {"leaf_length_min_m": 0.14, "leaf_length_max_m": 0.22}
+SMALL = {"leaf_length_min_m": 0.06, "leaf_length_max_m": 0.10}
+VARIANTS = {  # changes of the tree, of the scanner, and any face
+    "as in the survey": ({}, {}, False),
+    "any face counts": ({}, {}, True),
+    "thin beam": ({}, {"beam_divergence_mrad": 0.0, "exit_aperture_m": 0.0, "sub_rays": 1}, False),
+    "leaves of 14 to 22 cm": (LARGE, {}, False),
+    "leaves of 6 to 10 cm": (SMALL, {}, False),
+    "400 clumps": ({"n_clumps": 400}, {}, False),
+    "60 clumps": ({"n_clumps": 60}, {}, False),
+}
+
+
+def main(snakemake):
+    settings = options(snakemake.params)
+    rows = []
+    for species, stand_settings in settings["stands"].items():
+        for name, (tree, beam, any_face) in VARIANTS.items():
+            if tree and tree.items() <= stands.SPECIES[species].items():
+                continue  # that is what the species is like
+            stand = stands.grow(species, **stand_settings, **tree)
+            rows += [
+                {"stand": species, "variant": name} | row
+                for row in scanned(stand, settings, beam, any_face)
+            ]
+    with atomic(snakemake.output.variants) as partial:
+        pd.DataFrame(rows).to_csv(partial, index=False, float_format="%.6g")
+
+
+def scanned(stand, settings, beam, any_face):
+    """Shadow, and regression of well covered cells, of the designs with one and five scans."""
+    size_m = settings["voxel_size_m"]
+    scanner = dataclasses.replace(hemisphere.Hemisphere(**settings["scanner"]), **beam)
+    filled = sum(stands.area_in_voxels(stand, part, size_m) for part in ("leaves", "wood")) > 0
+    per_edge = shadow.voxels_per_cell(settings["cell_size_m"], size_m)
+    truth = shadow.in_cells(filled, per_edge)
+    world = hemisphere.world_of(stand)
+    for design in ("single", "diamond"):
+        places_m = designs.positions(design, stand.size_m, settings["height_m"])
+        reach = Reach.empty(filled.shape, size_m, any_face)
+        for number, place_m in enumerate(places_m):
+            seed = stream_seed(settings["seed"], design, number)
+            for beams in hemisphere.scan(world, stand, place_m, scanner, len(places_m), seed):
+                reach.add(beams)
+        flags = reach.joined()
+        for bit, n_beams in enumerate(scanner.n_beams(len(places_m))):
+            found = attribute(*flags, bit)
+            contact, coverage = correction.contact_frequency(found, per_edge)
+            well = (coverage > 0.8) & (truth > 0)
+            slope, r2, n = correction.regression(truth[well], contact[well])
+            yield (
+                {"design": design, "n_beams": n_beams, "filled_voxels": int(np.sum(filled))}
+                | shadow.relative_shadow(found, filled)
+                | {"slope_above_80": slope, "r2_above_80": r2, "n_above_80": n}
+            )
+
+
+if __name__ == "__main__":
+    run(main, snakemake)
