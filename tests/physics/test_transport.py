@@ -140,6 +140,26 @@ def test_a_scattering_layer_agrees_with_discrete_ordinates(leaf_area_index):
         assert mean == pytest.approx(expected, rel=0.02)
 
 
+def test_a_repeated_cell_of_voxels_is_an_endless_layer():
+    size_m, leaf_area_index = 2.0, 2.0
+    layer = turbid_slab(leaf_area_index).isel(x=slice(0, 3), y=slice(0, 2))
+    layer = (layer * 20.0 / size_m).assign_coords(x=[1.0, 3.0, 5.0], y=[1.0, 3.0], z=[2.0])
+    layer = layer.assign_attrs(voxel_size_m=size_m)
+    scene = traced.load(Scene(voxels=layer), cell_m=np.array([[0.0, 0.0], [6.0, 4.0]]))
+    counted = transport.collect(
+        scene,
+        SENSOR + np.array([1.7, 3.2, 0.0]),
+        n_paths=150_000,
+        n_patches=145,
+        max_orders=90,
+        seed=1,
+    )
+    mean, error = total(counted, optics(0.4, 0.3))
+    expected = transmitted_irradiance(leaf_area_index, 0.4, 0.3)
+    assert mean == pytest.approx(expected, abs=4 * error)
+    assert error < 0.01 * expected
+
+
 def test_light_through_two_layers_is_the_same_from_either_side():
     """Reciprocity: swapping a thin and a thick layer changes what they reflect, not what passes."""
     leaf = optics(0.5, 0.3, ground=0.0)
@@ -189,6 +209,14 @@ def test_what_is_cut_off_is_bounded():
     bound = np.pi * cut.truncated_share(leaf)[0]
     assert 0 < lost < bound < 10 * lost
     assert whole.truncated_share(leaf)[0] < 1e-6
+
+
+def test_without_any_order_only_light_straight_from_the_sky_is_left():
+    counted = collect(MIXED, n_paths=2000, max_orders=0)
+    assert len(counted.count) == 0
+    assert counted.cut[0] > 0
+    straight = tensor.straight(counted, np.ones((1, 145))).mean()
+    assert total(counted, optics(0.5, 0.4, ground=1.0))[0] == pytest.approx(straight)
 
 
 def test_a_closed_box_lets_nothing_in():

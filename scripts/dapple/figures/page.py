@@ -9,7 +9,7 @@ import pandas as pd
 
 TABLES = {
     "statistics/overall.csv": "Simulated against measured PAR, records that no fit has seen",
-    "statistics/mixed_model.csv": "Mixed model: measured on simulated light, sensor as random effect",
+    "statistics/mixed_model.csv": "Measured on simulated light, sensor as random effect",
     "statistics/agreement.csv": "Transport engine against per-timestep reference",
     "runtime.csv": "Time and memory of every step",
 }
@@ -19,6 +19,8 @@ FIGURES = {
     "figures/boxplot.png": "Correlation of every sensor by reconstruction.",
     "figures/scatter.png": "Simulated against measured PAR.",
     "figures/ground_map.png": "PAR on the ground.",
+    "figures/advice.png": "What each refinement of the light changes.",
+    "tradeoff/chart.png": "Accuracy against speed.",
 }
 STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; }

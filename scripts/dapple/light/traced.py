@@ -27,9 +27,11 @@ class TracedScene:
     variant : str
         Of Mitsuba.
     meshes : mitsuba.Scene or None
-        Leaf and wood.
-    leaf : mitsuba shape pointer
-        Tells leaf from wood.
+        Leaf and wood as one mesh, which may stand in many places.
+    n_leaf : Dr.Jit UInt32
+        The mesh's first so many triangles are leaf, the others wood.
+    normals : Dr.Jit Float
+        (3 * triangles,) unit normals; places are shifts and do not turn them.
     grid : TurbidVoxels or None
         Turbid voxels.
     ground_z, top_z, ray_offset : Dr.Jit Float
@@ -39,9 +41,10 @@ class TracedScene:
         The ground plan that is repeated sideways without end.
     """
 
-    def __init__(self, variant: str, meshes, leaf, grid, box_m, ground_z_m: float, cell_m):
-        self.variant, self.meshes, self.leaf, self.grid = variant, meshes, leaf, grid
+    def __init__(self, variant: str, meshes, grid, box_m, ground_z_m: float, cell_m):
+        self.variant, self.grid = variant, grid
         mi = self.mi
+        self.meshes, self.n_leaf, self.normals = meshes or (None, None, None)
         extent = max(LEAST_EXTENT_M, float(np.abs(box_m).max()))
         # Opaque numbers stay out of the kernel's code: one kernel serves all scenes.
         self.ground_z, self.top_z, self.ray_offset = (
@@ -102,9 +105,8 @@ class TracedScene:
         normal = mi.Normal3f(0, 0, 1)
         leaf = mi.Bool(voxel)
         if dr.hint(self.meshes is not None, mode="scalar"):
-            surface = found.compute_surface_interaction(ray, mi.RayFlags.Minimal, mesh)
-            normal[mesh] = surface.n
-            leaf |= mesh & (surface.shape == self.leaf)
+            leaf |= mesh & (found.prim_index < self.n_leaf)
+            normal[mesh] = dr.gather(mi.Normal3f, self.normals, found.prim_index, mesh)
         if dr.hint(self.grid is not None, mode="scalar"):
             drawn = self.grid.leaf_normal(direction, rng, voxel)
             normal[voxel] = drawn
@@ -224,27 +226,28 @@ def load(
     grid = turbid.load(mi, scene.voxels)
     cell = None if cell_m is None else np.asarray(cell_m, np.float64)
     _check_cell(grid, cell)
-    filled = {kind: mesh for kind, mesh in scene.meshes.items() if len(mesh.faces)}
-    shapes = {kind: _mitsuba_mesh(mi, kind, mesh) for kind, mesh in filled.items()}
+    filled = [scene.meshes[kind] for kind in MESH_KINDS if kind in scene.meshes]
+    filled = [mesh for mesh in filled if len(mesh.faces)]
     boxes = [] if grid is None else [np.array([grid.low_m, grid.high_m])]
-    loaded, leaf = None, dr.zeros(mi.ShapePtr)
-    if shapes:
-        vertices = [mesh.vertices_m for mesh in filled.values()]
+    meshes = None
+    if filled:
+        vertices = [mesh.vertices_m for mesh in filled]
         box = np.array(
             [np.min([v.min(0) for v in vertices], 0), np.max([v.max(0) for v in vertices], 0)]
         )
-        if places_m is None and cell is None:
-            content = shapes
-        else:
+        mesh, normals = _merged(mi, filled)
+        content = {"plant": mesh}
+        if places_m is not None or cell is not None:
             places = _with_copies(np.zeros((1, 3)) if places_m is None else places_m, box, cell)
-            content = _instances(mi, shapes, places)
+            content = _instances(mi, mesh, places)
             box = box + np.array([places.min(axis=0), places.max(axis=0)])
         boxes.append(box)
         loaded = mi.load_dict({"type": "scene", **content}, optimize=False)
-        leaf = mi.ShapePtr(shapes["leaf"]) if "leaf" in shapes else leaf
+        n_leaf = len(scene.meshes["leaf"].faces) if "leaf" in scene.meshes else 0
+        meshes = loaded, dr.opaque(mi.UInt32, n_leaf), normals
     boxes.append(np.full((2, 3), scene.ground_z_m))
     box = np.array([np.min(boxes, axis=(0, 1)), np.max(boxes, axis=(0, 1))])
-    return TracedScene(variant, loaded, leaf, grid, box, scene.ground_z_m, cell)
+    return TracedScene(variant, meshes, grid, box, scene.ground_z_m, cell)
 
 
 def _check_cell(grid, cell: np.ndarray | None) -> None:
@@ -279,8 +282,8 @@ def _with_copies(places_m: np.ndarray, box_m: np.ndarray, cell_m: np.ndarray | N
     return every[((high > cell_m[0]) & (low < cell_m[1])).all(axis=1)]
 
 
-def _instances(mi: ModuleType, shapes: dict, places_m: np.ndarray) -> dict:
-    content = {"plant": {"type": "shapegroup", **shapes}}
+def _instances(mi: ModuleType, mesh, places_m: np.ndarray) -> dict:
+    content = {"plant": {"type": "shapegroup", "mesh": mesh}}
     for index, place in enumerate(places_m):
         content[f"plant_{index}"] = {
             "type": "instance",
@@ -290,11 +293,21 @@ def _instances(mi: ModuleType, shapes: dict, places_m: np.ndarray) -> dict:
     return content
 
 
-def _mitsuba_mesh(mi: ModuleType, name: str, mesh: Mesh):
-    """A mesh without texture coordinates and vertex normals."""
-    loaded = mi.Mesh(name, len(mesh.vertices_m), len(mesh.faces))
-    parameters = mi.traverse(loaded)
-    parameters["vertex_positions"] = mesh.vertices_m.astype(np.float32).ravel()
-    parameters["faces"] = mesh.faces.astype(np.uint32).ravel()
+def _merged(mi: ModuleType, meshes: list[Mesh]):
+    """Meshes as one of Mitsuba's, in their order, and its unit normals (3 * triangles,)."""
+    first = np.cumsum([0] + [len(mesh.vertices_m) for mesh in meshes])
+    vertices = mi.Float(np.concatenate([m.vertices_m.astype(np.float32).ravel() for m in meshes]))
+    faces = [
+        (mesh.faces.astype(np.uint32) + np.uint32(shift)).ravel()
+        for mesh, shift in zip(meshes, first[:-1], strict=True)
+    ]
+    faces = mi.UInt32(np.concatenate(faces))
+    merged = mi.Mesh("plant", int(first[-1]), dr.width(faces) // 3)
+    parameters = mi.traverse(merged)
+    parameters["vertex_positions"], parameters["faces"] = vertices, faces
     parameters.update()
-    return loaded
+    corner = dr.gather(mi.Vector3u, faces, dr.arange(mi.UInt32, dr.width(faces) // 3))
+    a, b, c = (dr.gather(mi.Point3f, vertices, index) for index in corner)
+    normals = dr.ravel(dr.normalize(dr.cross(b - a, c - a)))
+    dr.eval(normals)
+    return merged, normals
