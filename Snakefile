@@ -17,6 +17,7 @@ include: "rules/light.smk"
 include: "rules/advice.smk"
 include: "rules/statistics.smk"
 include: "rules/figures.smk"
+include: "rules/survey_common.smk"
 include: "rules/survey.smk"
 
 

@@ -117,7 +117,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("data", type=Path)
     parser.add_argument("output", type=Path)
-    parser.add_argument("--paths", type=int, default=200_000, help="paths of each view")
+    parser.add_argument("--paths", type=int, default=280_000, help="paths of each view")
     parser.add_argument("--variant", default="llvm_ad_rgb")
     options = parser.parse_args()
     clock = time.perf_counter()

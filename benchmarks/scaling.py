@@ -32,7 +32,7 @@ AXES = {
 }
 SPACING_M = 8.0
 """Of the trees of a stand."""
-STEPS = ("build_s", "direct_s", "paths_s", "bands_s")
+STEPS = ("build", "direct", "paths", "bands")
 
 
 def memory_mb(field: str) -> float:
@@ -57,29 +57,37 @@ def point(triangles: int, sensors: int, times: int, trees: int, variant: str) ->
         places = SPACING_M * np.stack([place % side, place // side, 0 * place], axis=1)
     before = memory_mb("VmRSS")
     Path("/proc/self/clear_refs").write_text("5")  # forgets the peak so far
-    begin = time.perf_counter()
+    begin = now()
     loaded = traced.load(scene, variant, places_m=places)
-    build = time.perf_counter() - begin
-    seconds = run(loaded, sensors, times)
+    spent = np.vstack([now() - begin, run(loaded, sensors, times)])
     return {
-        **dict(zip(STEPS, [build, *seconds], strict=True)),
+        **{
+            f"{step}_{kind}": x
+            for step, row in zip(STEPS, spent, strict=True)
+            for kind, x in zip(("s", "cpu_s"), row, strict=True)
+        },
         "engine_mb": memory_mb("VmHWM") - before,
         "geometry_mb": before,
     }
 
 
+def now() -> np.ndarray:
+    """Wall time and processor time of all threads [s]."""
+    return np.array([time.perf_counter(), time.process_time()])
+
+
 def run(scene: traced.TracedScene, n_sensors: int, n_times: int) -> np.ndarray:
-    """Seconds of shadow rays, of paths, and of the product with all bands."""
+    """Wall and processor seconds (3, 2) of shadow rays, paths, and the product with all bands."""
     sensors, sky = crown.sensors(n_sensors), crown.sky(n_times)
-    clock = [time.perf_counter()]
+    clock = [now()]
     suns = series.towards_sun(sky)
     sunlit = direct.sunlit(scene, sensors, suns, tolerance=1.0, max_rays=256, seed=1)
-    clock.append(time.perf_counter())
+    clock.append(now())
     counted = transport.collect(scene, sensors, n_paths=1024, n_patches=577, max_orders=30, seed=2)
-    clock.append(time.perf_counter())
+    clock.append(now())
     series.compute(sunlit, counted, sky, crown.optics(), sun_kernel_deg=8.0)
-    clock.append(time.perf_counter())
-    return np.diff(clock)
+    clock.append(now())
+    return np.diff(clock, axis=0)
 
 
 def draw(table: pd.DataFrame, path: Path) -> None:
@@ -94,18 +102,20 @@ def draw(table: pd.DataFrame, path: Path) -> None:
         constrained_layout=True, squeeze=False,
     )  # fmt: skip
     labels = {
-        "build_s": "tree for rays",
-        "direct_s": "sun",
-        "paths_s": "sky and paths",
-        "bands_s": "bands",
+        "build": "tree for rays",
+        "direct": "sun",
+        "paths": "sky and paths",
+        "bands": "bands",
     }
     for column, name in enumerate(axes_names):
         part = table[table["axis"] == name]
         for step in STEPS:
-            axes[0, column].loglog(part["value"], part[step], marker=".", label=labels[step])
+            axes[0, column].loglog(
+                part["value"], part[f"{step}_cpu_s"], marker=".", label=labels[step]
+            )
         axes[1, column].loglog(part["value"], part["engine_mb"], marker=".", color="0.3")
         axes[1, column].set_xlabel(name)
-    axes[0, 0].set_ylabel("time [s]")
+    axes[0, 0].set_ylabel("processor time [s]")
     axes[1, 0].set_ylabel("memory of the engine [MB]")
     axes[0, 0].legend(fontsize="small")
     figure.savefig(path, dpi=150)

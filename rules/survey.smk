@@ -15,67 +15,6 @@ Makes   survey/{stand}_{replicate}/truth.nc          leaf and wood area of every
         survey/coverage.csv                          on request: coverage classes of a real scan
 """
 
-SURVEY = settings.survey
-REPLICATES = range(1, SURVEY.replicates + 1)
-STANDS = [(stand, replicate) for stand in SURVEY.stands for replicate in REPLICATES]
-SCANS = [(*stand, design) for stand in STANDS for design in SURVEY.designs]
-SCANNER = {
-    key: getattr(SURVEY, key)
-    for key in (
-        "zenith_step_deg",
-        "azimuth_steps_deg",
-        "beam_divergence_mrad",
-        "exit_aperture_m",
-        "sub_rays",
-        "reflectance",
-        "min_energy",
-        "pulse_m",
-    )
-}
-
-if SURVEY.enabled:
-    from dapple.survey.checks import check
-
-    try:
-        check(
-            stands=SURVEY.stands,
-            leaf_area_index=SURVEY.leaf_area_index,
-            volume_m=SURVEY.volume_m,
-            voxel_size_m=SURVEY.voxel_size_m,
-            cell_size_m=SURVEY.cell_size_m,
-            design_names=SURVEY.designs,
-            positions_m=SURVEY.positions_m,
-            height_m=SURVEY.height_m,
-            density_step_deg=SURVEY.density_step_deg,
-            scanner=SCANNER,
-        )
-    except InputError as error:
-        sys.exit(f"dapple: {error}")
-
-
-def grown(stand, replicate):
-    """What a stand is grown from."""
-    leaf_area_index = dict(zip(SURVEY.stands, SURVEY.leaf_area_index))
-    return {
-        "positions_m": SURVEY.trees_m,
-        "size_m": SURVEY.volume_m,
-        "leaf_area_index": leaf_area_index[stand],
-        "n_grown": SURVEY.grown,
-        "seed": stream("survey", replicate),
-    }
-
-
-def stand_settings(wildcards):
-    """What the stand of a job is grown from."""
-    return grown(wildcards.stand, wildcards.replicate)
-
-
-def survey_files(name, runs):
-    """One file of every run (stand, replicate and, for scans, design)."""
-    return [
-        results(f"survey/{run[0]}_{run[1]}/{name.format(*run[2:])}.nc") for run in runs
-    ]
-
 
 rule survey_stand:
     input:

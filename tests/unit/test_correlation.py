@@ -209,3 +209,11 @@ def test_r_outside_the_main_thread_is_refused():
     thread.start()
     thread.join()
     assert "main thread" in caught[0]
+
+
+def test_r_leaves_the_library_path_of_later_programs_alone():
+    code = "import os; from dapple.stats import r_bridge; r_bridge._start(); "
+    code += "print(os.environ['LD_LIBRARY_PATH'])"
+    mine = os.environ | {"LD_LIBRARY_PATH": "/somewhere/of/mine", "PYTHONPATH": "scripts"}
+    done = subprocess.run([sys.executable, "-c", code], env=mine, capture_output=True, text=True)
+    assert done.stdout.strip() == "/somewhere/of/mine"

@@ -226,6 +226,13 @@ def test_no_line_crosses_missing_records():
     assert len(line.get_ydata()) == 21
 
 
+def test_without_records_the_simulations_are_drawn_alone():
+    figure = series.draw(records().drop(columns="measured"), ["1_1"], timezone="UTC")
+    labels = [line.get_label() for line in figure.axes[0].lines]
+    assert len(labels) == 2
+    assert "measured" not in labels
+
+
 def test_an_unknown_sensor_is_named():
     with pytest.raises(InputError, match="found 9_9; expected labels such as 1_1"):
         series.draw(records(), ["1_1", "9_9"], timezone="UTC")

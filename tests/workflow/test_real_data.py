@@ -11,7 +11,7 @@ DATA = (ROOT / "../shared/data").resolve()
 THREE_TIMES = (
     "time={start: 2023-08-10 11:00, end: 2023-08-10 15:00, step_min: 120}",
     "sensors={columns: 4, rows: 3, spacing_m: 2.0}",
-    "light={timestep: {replicates: 4, step_min: 120}, transport: {tolerance: 0.02}}",
+    "light={check: false, timestep: {replicates: 4, step_min: 120}, transport: {tolerance: 0.02}}",
     "figures={map_spacing_m: 1.0}",
 )
 

@@ -51,8 +51,8 @@ def draw(
     Parameters
     ----------
     records : DataFrame
-        `reconstruction, sensor, time` (UTC), `measured, simulated` [µmol m⁻² s⁻¹]; where
-        components are drawn also `direct`, the simulated direct beam.
+        `reconstruction, sensor, time` (UTC), `simulated` and, where there are records, `measured`
+        [µmol m⁻² s⁻¹]; where components are drawn also `direct`, the simulated direct beam.
     sensors : sequence of str
         Sensors to draw, one panel each, in this order.
     timezone : str
@@ -82,8 +82,8 @@ def draw(
     for axes in panels[max(len(sensors) - columns, 0) : len(sensors)]:
         axes.tick_params(labelbottom=True)
     _time_axis(panels[0], records["time"])
-    top = max(records["measured"].max(), records["simulated"].max())
-    panels[0].set_ylim(0, 1.05 * top)
+    top = records.filter(["measured", "simulated"]).max().max()
+    panels[0].set_ylim(0, 1.05 * max(top, 1.0))  # a night has an axis too
     figure.supylabel(f"PAR [{style.PAR_UNIT}]", fontsize=9)
     figure.supxlabel(_time_note(records["time"], timezone), fontsize=9)
     handles, labels = panels[0].get_legend_handles_labels()
@@ -96,8 +96,9 @@ def _panel(axes: Axes, own: pd.DataFrame, names: tuple[str, ...], components_of:
         time, simulated, direct = _line(own, components_of, "simulated", "direct")
         text = f"{style.label(components_of)}: sky and scattered"
         axes.fill_between(time, 0, simulated - direct, color="#DDDDDD", lw=0, label=text)
-    measured = _line(own, own["reconstruction"].iloc[0], "measured")
-    axes.plot(*measured, color=style.COLOURS["measured"], lw=1.6, alpha=0.9, label="measured")
+    if "measured" in own:
+        measured = _line(own, own["reconstruction"].iloc[0], "measured")
+        axes.plot(*measured, color=style.COLOURS["measured"], lw=1.6, alpha=0.9, label="measured")
     for name in names:
         line = _line(own, name, "simulated")
         axes.plot(*line, color=style.colour(name, names), lw=1.1, label=style.label(name))

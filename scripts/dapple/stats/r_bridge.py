@@ -78,6 +78,7 @@ def _start():
     """Import rpy2, which starts R in this process, and send R's messages to the log."""
     # The compiled interface exists only where rpy2 was built against this R; ABI always works.
     os.environ.setdefault("RPY2_CFFI_MODE", "ABI")
+    library_path = os.environ.get("LD_LIBRARY_PATH")
     try:
         from rpy2 import robjects
         from rpy2.rinterface_lib import callbacks
@@ -85,6 +86,11 @@ def _start():
         raise InputError(
             "statistics", f"no R that starts ({error})", "R 4.2 or newer on the PATH", REMEDY
         ) from error
+    # R puts the system's libraries first, with which a program started later may not work: a Python
+    # of another build would load the system's.
+    os.environ.pop("LD_LIBRARY_PATH", None)
+    if library_path is not None:
+        os.environ["LD_LIBRARY_PATH"] = library_path
     callbacks.consolewrite_warnerror = lambda text: log.warning("R: %s", text.strip())
     callbacks.consolewrite_print = lambda text: log.info("R: %s", text.rstrip())
     robjects.r("options(warn = 1)")  # at once: R would keep warnings back until some later call
