@@ -1,8 +1,7 @@
 """Grow the virtual apple tree; its leaf and wood area are the truth of the run."""
 
-from dapple.virtual.plants import apple_tree
-
 from dapple.formats import json, meshes
+from dapple.virtual.plants import apple_tree
 from dapple.workflow import options, run
 
 

@@ -1,8 +1,7 @@
 """Place virtual leaf polygons along real wood."""
 
-from dapple.virtual.leaves import along_wood
-
 from dapple.formats import meshes
+from dapple.virtual.leaves import along_wood
 from dapple.workflow import options, run
 
 

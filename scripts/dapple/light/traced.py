@@ -138,7 +138,9 @@ class TracedScene:
         mi = self.mi
         if dr.hint(self.cell is None, mode="scalar"):
             if dr.hint(self.meshes is not None, mode="scalar"):
-                active &= ~self.meshes.ray_test(mi.Ray3f(origin, direction), active)
+                active &= ~self.meshes.ray_test(
+                    mi.Ray3f(origin, direction), coherent=True, active=active
+                )
             passed = mi.Float(1)
             if dr.hint(self.grid is not None, mode="scalar"):
                 passed = self.grid.transmittance(origin, direction, mi.Float(dr.inf), active)

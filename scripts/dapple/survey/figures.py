@@ -32,6 +32,9 @@ def shadowing(table: pd.DataFrame) -> Figure:
                             color=COLOURS[design], alpha=0.2, lw=0)  # fmt: skip
             ax.plot(over.index / 1e6, over["mean"], "o-", ms=3, color=COLOURS[design], label=design)
         ax.set(xscale="log", xlabel="beams of the whole design [million]", title=stand.title())
+        beams = np.unique(table["n_beams"]) / 1e6
+        ax.set_xticks(beams, [f"{n:.2g}" for n in beams])
+        ax.minorticks_off()
     axes[0].set(ylabel="relative shadow [%]", ylim=(0, 100))
     axes[0].legend()
     return figure
