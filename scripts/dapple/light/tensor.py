@@ -92,8 +92,8 @@ def nominal_error(transport: Transport, optics: Optics, *, sun_kernel_deg: float
     Returns
     -------
     (n_sensors,) float64
-        As a share of the open sky's light, the largest one under an overcast sky of even radiance
-        and clear ones.
+        As a share of the open sky's light, the largest one of clear skies or half of that of an
+        overcast sky of even radiance: without sun the light has no error but this.
     """
     sky = patches(transport.n_patches)
     overcast, clear, suns = _nominal_skies(sky)
@@ -101,7 +101,7 @@ def nominal_error(transport: Transport, optics: Optics, *, sun_kernel_deg: float
     clear = clear + beam * sun_radiance(suns, sky, kernel_deg=sun_kernel_deg)
     flux = np.full((1 + len(suns), len(optics)), 1 / len(optics))
     light = summed_scattered(transport, np.concatenate([overcast, clear]), flux, optics)
-    return np.sqrt(light.var(axis=1, ddof=1) / transport.n_replicates).max(axis=1)
+    return _nominal_error(light)
 
 
 def nominal_straight_error(sky_seen: np.ndarray) -> np.ndarray:
@@ -114,9 +114,14 @@ def nominal_straight_error(sky_seen: np.ndarray) -> np.ndarray:
     """
     sky = patches(sky_seen.shape[2])
     overcast, clear, _ = _nominal_skies(sky)
-    weight = np.concatenate([overcast, clear]) * sky.projected_solid_angle_sr
-    light = sky_seen.astype(np.float64) @ weight.T
-    return np.sqrt(light.var(axis=1, ddof=1) / sky_seen.shape[1]).max(axis=1)
+    return _nominal_error(_straight(sky_seen, np.concatenate([overcast, clear])))
+
+
+def _nominal_error(light: np.ndarray) -> np.ndarray:
+    """(n,) largest standard error of light (n, r, skies), where the first sky is overcast."""
+    error = np.sqrt(light.var(axis=1, ddof=1) / light.shape[1])
+    error[:, 0] /= 2
+    return error.max(axis=1)
 
 
 def _nominal_skies(sky: Patches) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -175,8 +180,16 @@ def straight(transport: Transport, radiance: np.ndarray) -> np.ndarray:
     (n_sensors, r, t) float64
         In units of the radiance times sr.
     """
-    weight = radiance * patches(transport.n_patches).projected_solid_angle_sr
-    return transport.sky_seen.astype(np.float64) @ weight.T
+    return _straight(transport.sky_seen, radiance)
+
+
+def _straight(sky_seen: np.ndarray, radiance: np.ndarray) -> np.ndarray:
+    """As `straight`, of the share of sky patches (n_sensors, r, p) that sensors see."""
+    n_patches = sky_seen.shape[2]
+    weight = radiance * patches(n_patches).projected_solid_angle_sr
+    # One product of two matrices is much faster than many of a stack.
+    table = sky_seen.reshape(-1, n_patches).astype(np.float64) @ weight.T
+    return table.reshape(*sky_seen.shape[:2], -1)
 
 
 def scattered(transport: Transport, radiance: np.ndarray, optics: Optics) -> np.ndarray:
