@@ -6,44 +6,27 @@ The default configuration, its schema and its documentation are made from these 
 
 from __future__ import annotations
 
-from datetime import datetime
 from math import sqrt
 from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Gt, Le
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from dapple import config_checks
-
-Positive = Annotated[float, Gt(0)]
-NotNegative = Annotated[float, Ge(0)]
-Share = Annotated[float, Ge(0), Le(1)]
-Count = Annotated[int, Ge(1)]
-# YAML reads a time with seconds as a time, one without as text.
-Moment = Annotated[
-    str, BeforeValidator(lambda value: str(value) if isinstance(value, datetime) else value)
-]
-LeafAngles = Literal[
-    "spherical", "planophile", "erectophile", "plagiophile", "extremophile", "uniform"
-]
-
-FREY = "Frey et al. 2025"
-RIEGL = "after the RIEGL VZ-400i"
-ZANDE = "Van der Zande et al. 2008"
-LMS = "after the SICK LMS200"
-
-
-def _(default: Any, text: str, source: str = "") -> Any:
-    """A parameter: default, what it means, and where its value comes from."""
-    return Field(
-        default, description=text, json_schema_extra={"source": source} if source else None
-    )
-
-
-class Section(BaseModel):
-    """A group of parameters; keys that are not parameters are errors."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+from dapple.config_base import (
+    FREY,
+    RIEGL,
+    Count,
+    LeafAngles,
+    Moment,
+    NotNegative,
+    Positive,
+    Section,
+    Share,
+)
+from dapple.config_base import parameter as _
+from dapple.config_light import Advice, Light, Tradeoff
+from dapple.config_survey import Survey
 
 
 class Plant(Section):
@@ -282,90 +265,6 @@ class Registration(Section):
     fit_share: Share = _(0.5, "share of it used for fitting")
 
 
-class Transport(Section):
-    """The transport engine: paths traced once, for any sky, spectrum and time."""
-
-    tolerance: Annotated[float, Gt(0), Le(1)] = _(
-        0.005, "standard error that is asked for, as a share of open-sky PAR"
-    )
-    sky_rays: Count = _(8192, "rays of every sensor to the open sky, at first")
-    paths: Count = _(4096, "scattered paths of every sensor, at first")
-    max_growth: Annotated[float, Ge(1)] = _(
-        64.0, "how many times more of both where the tolerance asks for them"
-    )
-    max_shadow_rays: Count = _(16_384, "most rays to the sun, per sensor and time")
-    sky_patches: Literal[1, 145, 577, 2305] = _(577, "subdivision of the sky", "Reinhart")
-    max_orders: Annotated[int, Ge(0), Le(255)] = _(12, "most surfaces on a path")
-    sun_kernel_deg: Positive = _(
-        8.0, "angle around the sun over which scattered paths are averaged"
-    )
-
-
-class Timestep(Section):
-    """The per-timestep engine: Mitsuba's own integrators, the independent check."""
-
-    step_min: Positive = _(10.0, "minutes between its times, a multiple of time.step_min")
-    bands: Literal[1, 3] = _(3, "groups of bands, traced together")
-    replicates: Annotated[int, Ge(2)] = _(16, "independent repetitions: the standard error")
-    direct_rays: Count = _(64, "rays to the sun, per sensor, time and replicate")
-    sky_rays: Count = _(64, "rays to the sky, likewise")
-    scattered_rays: Count = _(32, "paths of scattered light, likewise")
-    max_depth: Annotated[int, Ge(2), Le(100)] = _(12, "longest path in segments")
-
-
-class Light(Section):
-    """The light at the sensors."""
-
-    engine: Literal["transport", "timestep"] = _("transport", "what computes light/*.nc")
-    model: Literal["full", "advised"] = _(
-        "full", "as these keys say, or the cheapest model within advice.tolerance"
-    )
-    check: bool = _(True, "compare the transport engine with the per-timestep engine")
-    variant: Literal["llvm", "cuda"] = _("llvm", "Mitsuba on the processor or on an NVIDIA GPU")
-    sun_diameter_deg: NotNegative = _(0.533, "angular diameter of the solar disc; 0: a point")
-    aperture_m: NotNegative = _(0.0, "diameter of the sensors' receiving discs; 0: points")
-    transport: Transport = Transport()
-    timestep: Timestep = Timestep()
-
-
-class Advice(Section):
-    """What each refinement of the light changes and costs, measured on a pilot."""
-
-    tolerance: Annotated[float, Gt(0), Le(1)] = _(
-        0.02, "what may be left out in all: RMSE as a share of open-sky PAR"
-    )
-    sensors: Count = _(12, "sensors of the pilot")
-    times: Count = _(9, "times of the pilot")
-    paths: Count = _(16_384, "paths, and rays to the sky, of every sensor of the pilot")
-    repeats: Count = _(3, "runs of every model, of which the shortest counts as its cost")
-    polygon_sizes_m: tuple[Positive, ...] = _(
-        (0.025, 0.05, 0.1, 0.2), "voxels of the polygons, the finest first"
-    )
-    voxel_sizes_m: tuple[Positive, ...] = _(
-        (0.1, 0.2, 0.5, 1.0), "edges of the turbid voxels, the finest first"
-    )
-
-
-class Tradeoff(Section):
-    """Accuracy against speed over a grid of settings."""
-
-    sensors: Count = _(24, "sensors of every run")
-    times: Count = _(21, "times of every run")
-    repeats: Count = _(2, "runs of every setting, of which the shortest counts as its cost")
-    paths: tuple[Count, ...] = _(
-        (256, 1024, 4096, 16_384), "paths, and rays to the sky, of every sensor"
-    )
-    sky_patches: tuple[Literal[1, 145, 577, 2305], ...] = _(
-        (1, 145, 577), "subdivisions of the sky"
-    )
-    max_orders: tuple[Annotated[int, Ge(0), Le(255)], ...] = _((0, 1, 2, 12), "most surfaces")
-    polygon_sizes_m: tuple[Positive, ...] = _((0.025, 0.05, 0.1, 0.2), "voxels of the polygons")
-    voxel_sizes_m: tuple[Positive, ...] = _((0.1, 0.2, 0.5, 1.0), "edges of the turbid voxels")
-    timestep_rays: tuple[Count, ...] = _(
-        (4, 16, 64), "rays of each kind, sensor, time and replicate of the per-timestep engine"
-    )
-
-
 class Statistics(Section):
     """How simulated and measured light are compared."""
 
@@ -380,42 +279,6 @@ class Figures(Section):
     map_times: tuple[Moment, ...] = _((), "times of the ground maps; empty: four spread ones")
     map_spacing_m: Positive = _(0.25, "pixel of the ground maps")
     map_margin_m: NotNegative = _(2.0, "ground shown beyond the crown")
-
-
-class Survey(Section):
-    """Where to put a scanner: designs, shadowing and correction in virtual stands."""
-
-    enabled: bool = _(False, "study scanning in virtual stands instead of light")
-    stands: tuple[str, ...] = _(("fagus", "platanus"), "species of the stands", ZANDE)
-    leaf_area_index: tuple[Positive, ...] = _((4.50, 5.15), "of each stand", ZANDE)
-    volume_m: tuple[Positive, Positive, Positive] = _((15.0, 15.0, 30.0), "edges", ZANDE)
-    trees_m: tuple[tuple[float, float], ...] = _(
-        ((3.75, 3.75), (11.25, 3.75), (3.75, 11.25), (11.25, 11.25)), "places of the trees"
-    )
-    grown: Count = _(2, "different trees in a stand; others are turned copies")
-    replicates: Annotated[int, Ge(2)] = _(3, "stands of each species, each of other trees")
-    designs: tuple[str, ...] = _(
-        ("single", "diamond", "corners"), "scan designs; `list` takes positions_m", ZANDE
-    )
-    positions_m: tuple[tuple[float, float], ...] = _((), "positions of the design `list`")
-    height_m: NotNegative = _(1.3, "height of the scanner above the ground")
-    zenith_step_deg: Annotated[float, Gt(0), Le(10)] = _(0.25, "step from 0 to 90", LMS)
-    azimuth_steps_deg: tuple[Annotated[float, Gt(0), Le(30)], ...] = _(
-        (0.5, 0.2, 0.1, 0.04, 0.02), "of one scan; k scans take k times these", ZANDE
-    )
-    beam_divergence_mrad: NotNegative = _(4.4, "full angle of the beam, 0.25°", LMS)
-    exit_aperture_m: NotNegative = _(0.01, "diameter of the beam at the scanner")
-    sub_rays: Annotated[int, Ge(1), Le(64)] = _(7, "rays that sample one beam")
-    reflectance: Annotated[float, Gt(0), Le(1)] = _(0.45, "of leaf and wood at 905 nm")
-    min_energy: Share = _(0.1, "reflected share of the beam that makes a return", ZANDE)
-    pulse_m: NotNegative = _(0.5, "nearer targets reflect together")
-    voxel_size_m: Positive = _(0.1, "voxels that are hit, passed or never reached", ZANDE)
-    cell_size_m: Positive = _(1.0, "cells of contact frequency and density", ZANDE)
-    density_step_deg: Positive = _(0.1, "azimuth step whose beams estimate density")
-    candidates: Annotated[int, Ge(2), Le(5)] = _(5, "planner: places along each edge")
-    plan_scans: Annotated[int, Ge(2), Le(12)] = _(6, "planner: largest number of scans")
-    kriging_range_m: Positive = _(2.0, "distance over which density is alike, for the fill")
-    kriging_neighbours: Annotated[int, Ge(3), Le(64)] = _(16, "known cells that fill a cell")
 
 
 class Tools(Section):

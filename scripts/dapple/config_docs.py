@@ -8,7 +8,8 @@ import yaml
 from annotated_types import Ge, Gt, Le
 from pydantic.fields import FieldInfo
 
-from dapple.config import Section, Settings
+from dapple.config import Settings
+from dapple.config_base import Section
 from dapple.formats.atomic import atomic
 
 CONFIG = Path(__file__).parents[2] / "config"
