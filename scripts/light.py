@@ -24,7 +24,6 @@ def main(snakemake):
             model,
             tolerance=series.DIRECT_SHARE * params.tolerance,
             max_rays=params.max_shadow_rays,
-            n_replicates=paths.n_replicates,
             sun_diameter_deg=params.sun_diameter_deg,
             aperture_m=params.aperture_m,
             seed=stream_seed(params.seed, number),

@@ -10,6 +10,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 PARTS = ("Snakefile", "rules", "scripts", "config", "profiles", "envs", "docs")
 SMALL = "config/virtual-apple-small.yaml"
+# As it was at first: R, in other tests, changes where this process looks for libraries.
+ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
 
 
 @dataclass
@@ -27,11 +29,10 @@ class Project:
         command += ["--cores", str(cores), "--nocolor", "--configfile", self.configfile]
         if overrides := (*self.overrides, *config):
             command += ["--config", *overrides]
-        environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
         return subprocess.run(
             command,
             cwd=self.folder,
-            env=environment,
+            env=ENVIRONMENT,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,

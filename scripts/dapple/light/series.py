@@ -24,7 +24,7 @@ PARTS = {
     "standard_error_umol_m2_s": "standard error of PAR",
 }
 
-DIRECT_SHARE, PATH_SHARE = 0.8, 0.45
+DIRECT_SHARE, PATH_SHARE = 0.8, 0.35
 """How a tolerance is shared out between shadow rays and paths, with a margin: the real sky is not
 the nominal one by which the number of paths is judged."""
 
