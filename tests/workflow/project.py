@@ -10,7 +10,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 PARTS = ("Snakefile", "rules", "scripts", "config", "profiles", "envs", "docs")
 SMALL = "config/virtual-apple-small.yaml"
-# As it was at first: R, in other tests, changes where this process looks for libraries.
+# As it was before a test could change it.
 ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
 
 
