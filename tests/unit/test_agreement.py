@@ -32,6 +32,12 @@ def test_night_does_not_count():
     assert agreement.compare(light(5.0), light(0.0), OPEN_SKY)["n"] == 6
 
 
+def test_a_run_of_nights_alone_has_nothing_to_compare_and_is_no_error():
+    row = agreement.compare(light(0.0), light(0.0), 0.0 * OPEN_SKY)
+    assert row.pop("n") == 0
+    assert np.isnan(list(row.values())).all()
+
+
 def test_z_is_the_difference_over_the_joint_standard_error():
     result = agreement.compare(light(110.0, 3.0), light(100.0, 4.0), OPEN_SKY)
     assert result["max_abs_z"] == pytest.approx(2.0, rel=1e-5)

@@ -250,13 +250,14 @@ def test_radiation_at_naive_times_is_refused_and_the_zone_has_to_exist(tmp_path,
 def test_at_night_there_is_no_light_and_no_error(small_run, tmp_path):
     project = small_run.clone(tmp_path / "night")
     night = "time={start: 2023-08-10 22:30, end: 2023-08-10 23:30}"
-    target = f"results/{project.experiment}/light/polygons.nc"
-    project.run(target, config=[night])
+    project.run(config=[night, "reconstructions=[polygons, truth]"])
     with xr.open_dataset(project.result("light/polygons.nc")) as light:
         light.load()
     assert list(light["time"].dt.hour) == [22, 23]
     for part in ("par", "par_direct", "par_sky", "par_scattered", "standard_error"):
         assert (light[f"{part}_umol_m2_s"] == 0).all()
+    overall = pd.read_csv(project.result("statistics/overall.csv"))
+    assert overall["r"].isna().all()  # nothing varies: unknown, not 0
 
 
 def test_ones_own_cloud_in_utm_gives_the_polygons_of_the_same_scan(small_run, tmp_path):

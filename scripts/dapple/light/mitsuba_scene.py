@@ -211,6 +211,13 @@ def build(
     register()
     colour = _colours(mi, optics)
     grid = turbid_grid(scene.voxels)
+    if grid is not None and grid.leaf_angle_distribution != "spherical":
+        raise InputError(
+            "leaf_angle_distribution",
+            grid.leaf_angle_distribution,
+            "spherical, for which the extinction is the same in all directions (G = 0.5)",
+            "For other leaf angles use the transport engine with light.check: false.",
+        )
     rows = 2 * round(90.0 / sky_step_deg) + 1
     shape = (rows, 2 * (rows - 1))
     content = {

@@ -67,11 +67,14 @@ class TurbidGrid:
         Outer corner of the first voxel, local frame [m].
     voxel_size_m : float
         Edge of the cubic voxels [m].
+    leaf_angle_distribution : str
+        Of the leaves' normals.
     """
 
     plant_area_density_m2_m3: np.ndarray
     low_m: np.ndarray
     voxel_size_m: float
+    leaf_angle_distribution: str
 
 
 def turbid_grid(voxels: xr.Dataset | None) -> TurbidGrid | None:
@@ -80,8 +83,8 @@ def turbid_grid(voxels: xr.Dataset | None) -> TurbidGrid | None:
     Parameters
     ----------
     voxels : xarray.Dataset or None
-        `plant_area_density_m2_m3` (x, y, z), attribute `voxel_size_m`; leaf angles must be
-        spherical where the attribute `leaf_angle_distribution` tells them.
+        `plant_area_density_m2_m3` (x, y, z), attributes `voxel_size_m` and
+        `leaf_angle_distribution` (spherical where it is missing).
 
     Returns
     -------
@@ -91,18 +94,10 @@ def turbid_grid(voxels: xr.Dataset | None) -> TurbidGrid | None:
     Raises
     ------
     InputError
-        The leaf angle distribution is not spherical: the medium would not be isotropic.
+        A negative density.
     """
     if voxels is None:
         return None
-    angles = str(voxels.attrs.get("leaf_angle_distribution", "spherical")).lower()
-    if angles != "spherical":
-        raise InputError(
-            "leaf_angle_distribution",
-            angles,
-            "spherical, for which the extinction is the same in all directions (G = 0.5)",
-            "Use the fast engine for other leaf angles, or voxels made with spherical ones.",
-        )
     density = voxels["plant_area_density_m2_m3"].transpose("x", "y", "z")
     values = np.nan_to_num(density.to_numpy().astype(np.float64), nan=0.0)
     if values.min(initial=0.0) < 0.0:
@@ -121,7 +116,8 @@ def turbid_grid(voxels: xr.Dataset | None) -> TurbidGrid | None:
         filled = np.flatnonzero(values.any(axis=others))
         box.append(slice(filled[0], filled[-1] + 1))
         low.append(float(density[name].to_numpy()[filled[0]]) - 0.5 * size)
-    return TurbidGrid(values[tuple(box)], np.array(low), size)
+    angles = str(voxels.attrs.get("leaf_angle_distribution", "spherical")).lower()
+    return TurbidGrid(values[tuple(box)], np.array(low), size, angles)
 
 
 def group_bands(

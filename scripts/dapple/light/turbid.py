@@ -9,7 +9,7 @@ import drjit as dr
 import numpy as np
 import xarray as xr
 
-from dapple.errors import InputError
+from dapple.light.scene import turbid_grid
 from dapple.structure import leaf_angles
 
 N_ANGLES = 1024
@@ -39,27 +39,16 @@ def load(mi: ModuleType, voxels: xr.Dataset | None) -> "TurbidVoxels | None":
     InputError
         A negative density, or leaf angles that are not known.
     """
-    if voxels is None:
+    grid = turbid_grid(voxels)
+    if grid is None:
         return None
-    density = voxels["plant_area_density_m2_m3"].transpose("x", "y", "z")
-    values = np.nan_to_num(density.to_numpy().astype(np.float64), nan=0.0)
-    if values.min(initial=0.0) < 0.0:
-        raise InputError(
-            "plant_area_density_m2_m3",
-            f"a density of {values.min():.3g} m2/m3",
-            "no negative density",
-            "Check the estimator that made the voxels.",
-        )
-    if not values.any():
-        return None
-    size_m = float(voxels.attrs["voxel_size_m"])
-    box, low_m = [], []
-    for axis, name in enumerate("xyz"):
-        filled = np.flatnonzero(values.any(axis=tuple({0, 1, 2} - {axis})))
-        box.append(slice(filled[0], filled[-1] + 1))
-        low_m.append(float(density[name][filled[0]]) - 0.5 * size_m)
-    distribution = str(voxels.attrs.get("leaf_angle_distribution", "spherical")).lower()
-    return TurbidVoxels(mi, values[tuple(box)], np.array(low_m), size_m, distribution)
+    return TurbidVoxels(
+        mi,
+        grid.plant_area_density_m2_m3,
+        grid.low_m,
+        grid.voxel_size_m,
+        grid.leaf_angle_distribution,
+    )
 
 
 class TurbidVoxels:

@@ -35,12 +35,13 @@ def compare(
     dict
         `n` pairs; `rmse_rel` and `bias_rel` (fast minus reference) of differences divided by
         open-sky PAR of their time; `max_abs_z`, the largest difference in units of the joint
-        standard error. Times without light are left out.
+        standard error. Times without light are left out; where there is no other, `n` is 0 and
+        the rest unknown (NaN).
 
     Raises
     ------
     InputError
-        The datasets share no sensor and time with light.
+        The datasets share no value of the same sensor and time.
     """
     fast, reference, open_sky = xr.align(fast, reference, open_sky_umol_m2_s, join="inner")
     difference = (fast[PAR] - reference[PAR]).transpose("sensor", "time").to_numpy()
@@ -48,15 +49,18 @@ def compare(
     sigma = np.sqrt(variance + (float_resolution * open_sky) ** 2)
     sigma = sigma.transpose("sensor", "time").to_numpy()
     scale = np.broadcast_to(open_sky.to_numpy(), difference.shape)
-    usable = np.isfinite(difference) & (scale > 0)
-    if not usable.any():
+    known = np.isfinite(difference)
+    if not known.any():
         raise InputError(
             "light datasets",
             f"no pair of values in {difference.shape[0]} common sensors and "
-            f"{difference.shape[1]} common times with light",
+            f"{difference.shape[1]} common times",
             "two runs of the same sensors at the same times",
-            "Give the reference timesteps that the fast engine has too, in daylight.",
+            "Give the reference timesteps that the fast engine has too.",
         )
+    usable = known & (scale > 0)
+    if not usable.any():
+        return {"n": 0} | dict.fromkeys(COLUMNS[2:], np.nan)
     relative = difference[usable] / scale[usable]
     return {
         "n": int(usable.sum()),
