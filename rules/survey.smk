@@ -278,7 +278,7 @@ rule survey_variants:
         mem_mb=3000,
     params:
         stands={stand: grown(stand, 1) for stand in SURVEY.stands},
-        scanner=SCANNER | {"azimuth_steps_deg": (0.5, 0.1)},
+        scanner=SCANNER | {"azimuth_steps_deg": (0.5, 0.1, 0.02)},
         height_m=SURVEY.height_m,
         voxel_size_m=SURVEY.voxel_size_m,
         cell_size_m=SURVEY.cell_size_m,

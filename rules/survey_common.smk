@@ -20,6 +20,7 @@ SCANNER = {
         "reflectance",
         "min_energy",
         "pulse_m",
+        "max_returns",
     )
 }
 

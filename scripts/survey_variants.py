@@ -13,11 +13,19 @@ from dapple.virtual import stands
 from dapple.workflow import options, run
 
 LARGE = {"leaf_length_min_m": 0.14, "leaf_length_max_m": 0.22}
+RIEGL = {  # as a VZ-400i: a narrow beam, a sensitive detector, several returns
+    "beam_divergence_mrad": 0.35,
+    "exit_aperture_m": 0.007,
+    "min_energy": 0.05,
+    "max_returns": 4,
+}
 SMALL = {"leaf_length_min_m": 0.06, "leaf_length_max_m": 0.10}
 VARIANTS = {  # changes of the tree, of the scanner, and any face
     "as in the survey": ({}, {}, False),
     "any face counts": ({}, {}, True),
     "thin beam": ({}, {"beam_divergence_mrad": 0.0, "exit_aperture_m": 0.0, "sub_rays": 1}, False),
+    "VZ-400i, four returns": ({}, RIEGL, False),
+    "VZ-400i, first return": ({}, RIEGL | {"max_returns": 1}, False),
     "leaves of 14 to 22 cm": (LARGE, {}, False),
     "leaves of 6 to 10 cm": (SMALL, {}, False),
     "400 clumps": ({"n_clumps": 400}, {}, False),

@@ -37,6 +37,7 @@ class Survey(Section):
     reflectance: Annotated[float, Gt(0), Le(1)] = _(0.45, "of leaf and wood at 905 nm")
     min_energy: Share = _(0.1, "reflected share of the beam that makes a return", ZANDE)
     pulse_m: NotNegative = _(0.5, "nearer targets reflect together")
+    max_returns: Annotated[int, Ge(1), Le(15)] = _(1, "kept of a beam; 1: the first alone", ZANDE)
     voxel_size_m: Positive = _(0.1, "voxels that are hit, passed or never reached", ZANDE)
     cell_size_m: Positive = _(1.0, "cells of contact frequency and density", ZANDE)
     density_step_deg: Positive = _(0.1, "azimuth step whose beams estimate density")

@@ -5,16 +5,16 @@ import pytest
 
 from dapple.errors import InputError
 from dapple.survey import checks, correction, designs, fill, hemisphere, plan, shadow
-from dapple.survey.hemisphere import Beams, Hemisphere, first_return
+from dapple.survey.hemisphere import Beams, Hemisphere, returns
 from dapple.survey.reach import HIT, PASSED, UNSEEN, Reach, attribute
 from dapple.virtual import stands
 
 
-def follow(origin, direction, range_m=np.inf, shape=(4, 4, 4), **options):
+def follow(origin, direction, range_m=(np.inf,), shape=(4, 4, 4), **options):
     direction = np.asarray(direction, float) / np.linalg.norm(direction)
     reach = Reach.empty(shape, 1.0, **options)
     one = np.ones(1, np.uint16)
-    reach.add(Beams(np.asarray(origin, float), direction[None], np.array([range_m]), one))
+    reach.add(Beams(np.asarray(origin, float), direction[None], np.array([range_m], float), one))
     return attribute(*reach.joined(), 0)
 
 
@@ -25,7 +25,7 @@ def test_a_beam_along_an_axis_passes_all_voxels_but_the_scanners_own():
 
 
 def test_a_beam_passes_up_to_its_return():
-    found = follow([0.5, 1.5, 2.5], [1, 0, 0], 1.7)
+    found = follow([0.5, 1.5, 2.5], [1, 0, 0], [1.7])
     assert found[:, 1, 2].tolist() == [UNSEEN, PASSED, HIT, UNSEEN]
 
 
@@ -43,8 +43,21 @@ def test_beams_from_outside_come_in_through_a_face():
 def test_a_return_needs_a_tenth_of_the_energy_within_a_pulse():
     hits = np.array([[1.0, 5.0, 5.2, np.inf], [1.0, 2.0, 3.0, np.inf]], np.float32)
     # one sub-ray in four at reflectance 0.3 is 0.075 of the beam: two are needed
-    assert first_return(hits, 0.075, 0.1, 0.5) == pytest.approx([5.2, np.inf])
-    assert first_return(hits, 0.1, 0.1, 0.5) == pytest.approx([1.0, 1.0])
+    assert returns(hits, 0.075, 0.1, 0.5, 1)[:, 0] == pytest.approx([5.2, np.inf])
+    assert returns(hits, 0.1, 0.1, 0.5, 1)[:, 0] == pytest.approx([1.0, 1.0])
+
+
+def test_targets_within_a_pulse_are_one_return_and_farther_ones_the_next():
+    hits = np.array([[1.0, 5.0, 5.2, 7.0, np.inf]], np.float32)
+    assert returns(hits, 0.1, 0.1, 0.5, 4)[0] == pytest.approx([1.0, 5.0, 7.0, np.inf])
+    assert returns(hits, 0.1, 0.1, 0.5, 2)[0] == pytest.approx([1.0, 5.0])
+
+
+def test_a_beam_with_several_returns_goes_on_to_the_last():
+    found = follow([0.5, 1.5, 2.5], [1, 0, 0], [1.2, 2.7])
+    assert found[:, 1, 2].tolist() == [UNSEEN, HIT, PASSED, HIT]
+    far = follow([-3.0, 1.5, 1.5], [1, 0, 0], [1.0, 5.5])
+    assert far[:, 1, 1].tolist() == [PASSED, PASSED, HIT, UNSEEN]
 
 
 def test_designs_share_the_beams_as_published():

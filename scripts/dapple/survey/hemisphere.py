@@ -45,6 +45,8 @@ class Hemisphere:
         Targets closer than this in range reflect together.
     max_range_m : float
         Longest range.
+    max_returns : int
+        Returns that are kept of a beam; 1 keeps the first alone.
     """
 
     zenith_step_deg: float = 0.25
@@ -56,6 +58,7 @@ class Hemisphere:
     min_energy: float = 0.1
     pulse_m: float = 0.5
     max_range_m: float = 80.0
+    max_returns: int = 1
 
     def __post_init__(self):
         ratio = np.divide(self.azimuth_steps_deg, min(self.azimuth_steps_deg, default=1))
@@ -116,8 +119,8 @@ class Beams:
         Scanner, frame of the stand [m].
     direction : (n, 3) float64
         Unit vectors.
-    range_m : (n,) float64
-        Range of the first return; infinite without one [m].
+    range_m : (n, r) float64
+        Ranges of the returns, near to far; infinite where there is none [m].
     bits : (n,) uint16
         Bit k is set where the beam is part of the scan with the k-th azimuth step.
     """
@@ -132,12 +135,12 @@ class Beams:
         chosen = np.flatnonzero(self.bits >> bit & 1)
         range_m = self.range_m[chosen]
         returned = np.isfinite(range_m)
-        nothing = np.full(returned.sum(), np.nan, np.float32)
+        nothing = np.full(np.count_nonzero(returned), np.nan, np.float32)
         return Shots(
             np.tile(self.origin_m, (len(chosen), 1)),
             self.direction[chosen],
             np.full(len(chosen), number, np.uint16),
-            np.r_[0, np.cumsum(returned)],
+            np.r_[0, np.cumsum(returned.sum(axis=1))],
             range_m[returned],
             nothing,
             nothing,
@@ -227,18 +230,19 @@ def scan(
             rays,
         )
         hit_m, _ = trace(world, rays, scanner.max_range_m)
-        range_m = first_return(
+        range_m = returns(
             hit_m.reshape(-1, len(pattern))[: len(number)],
             scanner.reflectance / len(pattern),
             scanner.min_energy,
             scanner.pulse_m,
+            scanner.max_returns,
         )
         yield Beams(position_m, direction, range_m, bits_of_line[line].astype(np.uint16))
 
 
 @njit(cache=True, parallel=True)
-def first_return(hit_m, energy_of_ray, min_energy, pulse_m):
-    """Range at which each beam first reflects enough energy within a pulse's length.
+def returns(hit_m, energy_of_ray, min_energy, pulse_m, max_returns):
+    """Ranges at which each beam reflects enough energy within a pulse's length.
 
     Parameters
     ----------
@@ -250,22 +254,32 @@ def first_return(hit_m, energy_of_ray, min_energy, pulse_m):
         Share that the detector needs.
     pulse_m : float
         Hits within this range reflect together [m].
+    max_returns : int
+        Later returns are lost.
 
     Returns
     -------
-    (n,) float64
-        Range of the hit that completes the energy; infinite where there is none [m].
+    (n, max_returns) float64
+        Range of the hit that completes the energy of each return; infinite where there is none [m].
     """
     n, k = hit_m.shape
-    need = int(np.ceil(min_energy / energy_of_ray - 1e-9))
-    result = np.full(n, np.inf)
+    need = max(int(np.ceil(min_energy / energy_of_ray - 1e-9)), 1)
+    result = np.full((n, max_returns), np.inf)
     for i in prange(n):
         sorted_m = np.sort(hit_m[i])
-        for j in range(max(need, 1) - 1, k):
-            near, far = sorted_m[j - max(need, 1) + 1], sorted_m[j]
-            if far < np.inf and far - near <= pulse_m:
-                result[i] = far
+        found, first = 0, 0
+        while found < max_returns and first + need <= k:
+            near, far = sorted_m[first], sorted_m[first + need - 1]
+            if far == np.inf:
                 break
+            if far - near > pulse_m:
+                first += 1
+                continue
+            result[i, found] = far
+            found += 1
+            # what lies within the pulse is part of this return
+            while first < k and sorted_m[first] - near <= pulse_m:
+                first += 1
     return result
 
 

@@ -24,7 +24,7 @@ class Reach:
     size_m : float
         Edge of the voxels; the grid's corner is the origin [m].
     hit, passed : (blocks, nx, ny, nz) uint16 or uint32
-        A first return lies in the voxel; a beam entered by one face and left by the opposite one.
+        A return lies in the voxel; a beam entered by one face and left by the opposite one.
     any_face : bool
         Count beams that leave by any face as passing.
     """
@@ -73,15 +73,20 @@ def _entry_axis(origin, direction, distance, size, shape):
 
 @njit(cache=True, parallel=True)
 def _follow(origin, direction, range_m, bits, size, hit, passed, any_face):
-    n_blocks, n = len(hit), len(direction)
+    n_blocks, n, n_returns = len(hit), len(direction), range_m.shape[1]
     shape = np.array(hit.shape[1:])
     corner = np.zeros(3)
     for block in prange(n_blocks):
         inverse, facet, index = np.empty(3), np.empty(3), np.empty(3, np.int64)
         for i in range(block * n // n_blocks, (block + 1) * n // n_blocks):
-            d, bit, end = direction[i], bits[i], range_m[i]
+            d, bit = direction[i], bits[i]
             distance, far = _clip(origin, d, corner, shape, size)
-            if not distance < far or end < distance:
+            following = 0
+            while following < n_returns and range_m[i, following] < distance:
+                following += 1
+            # a beam ends at its last return; nobody knows how far it went on
+            ended = following > 0 and (following == n_returns or range_m[i, following] == np.inf)
+            if not distance < far or ended:
                 continue
             _start(origin, d, corner, shape, size, distance, inverse, index, facet)
             entered = _entry_axis(origin, d, distance, size, shape)
@@ -89,9 +94,13 @@ def _follow(origin, direction, range_m, bits, size, hit, passed, any_face):
                 k = _nearest(facet)
                 leave = facet[k]
                 x, y, z = index[0], index[1], index[2]
-                if end < leave:
+                is_hit = following < n_returns and range_m[i, following] < leave
+                if is_hit:
                     hit[block, x, y, z] |= bit
-                    break
+                    while following < n_returns and range_m[i, following] < leave:
+                        following += 1
+                    if following == n_returns or range_m[i, following] == np.inf:
+                        break
                 straight = entered == k or (any_face and leave - distance > 1e-9 * size)
                 if straight and passed[block, x, y, z] & bit != bit:
                     passed[block, x, y, z] |= bit
