@@ -99,18 +99,13 @@ def of_shots(
 def add_shots(reach: Reach, shots: Shots, corner_m: np.ndarray) -> None:
     """Follow shots with any number of returns through the grid; bit 0 is set."""
     n_returns = np.diff(shots.first)
-    last_m = np.full(len(shots), np.inf)
-    returned = n_returns > 0
-    last_m[returned] = shots.range_m[shots.first[1:][returned] - 1]
+    range_m = np.full((len(shots), max(int(n_returns.max(initial=0)), 1)), np.inf)
+    shot = np.repeat(np.arange(len(shots)), n_returns)
+    range_m[shot, np.arange(len(shot)) - shots.first[shot]] = shots.range_m
     bits = np.ones(len(shots), reach.hit.dtype)
     for origin in np.unique(shots.origin_m, axis=0):
         own = (shots.origin_m == origin).all(axis=1)
-        reach.add(Beams(origin - corner_m, shots.direction[own], last_m[own], bits[own]))
-    shot = np.repeat(np.arange(len(shots)), n_returns)
-    place = shots.origin_m[shot] + shots.range_m[:, None] * shots.direction[shot] - corner_m
-    index = np.floor(place / reach.size_m).astype(int)
-    inside = ((index >= 0) & (index < reach.hit.shape[1:])).all(axis=1)
-    reach.hit[(0, *index[inside].T)] |= 1
+        reach.add(Beams(origin - corner_m, shots.direction[own], range_m[own], bits[own]))
 
 
 def _bounds(chunks: Iterable[Shots]) -> tuple[np.ndarray, np.ndarray]:
