@@ -291,8 +291,7 @@ rule survey_variants:
 
 rule survey_next:
     input:
-        voxels=results("structure/voxels_1.0/voxels.nc"),
-        shots=results("scan/shots.parquet"),
+        **PLANNED_FROM,
         code=code("survey_next"),
     output:
         next=results("survey/next.csv"),
@@ -308,6 +307,8 @@ rule survey_next:
     params:
         along=SURVEY.candidates,
         scans=SURVEY.plan_scans,
+        height_m=SURVEY.height_m,
+        cell_size_m=SURVEY.cell_size_m,
         voxel_size_m=SURVEY.voxel_size_m,
         zenith_step_deg=SURVEY.zenith_step_deg,
         azimuth_step_deg=max(SURVEY.azimuth_steps_deg),

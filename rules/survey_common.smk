@@ -24,6 +24,15 @@ SCANNER = {
     )
 }
 
+PLANNED_FROM = (
+    {"canopy": data(SURVEY.canopy)}
+    if SURVEY.canopy
+    else {
+        "voxels": results(f"structure/voxels_{SURVEY.cell_size_m}/voxels.nc"),
+        "shots": results("scan/shots.parquet"),
+    }
+)
+
 if SURVEY.enabled:
     from dapple.survey.checks import check
 

@@ -42,6 +42,7 @@ class Survey(Section):
     cell_size_m: Positive = _(1.0, "cells of contact frequency and density", ZANDE)
     density_step_deg: Positive = _(0.1, "azimuth step whose beams estimate density")
     candidates: Annotated[int, Ge(2), Le(5)] = _(5, "planner: places along each edge")
+    canopy: str = _("", "planner: airborne cloud to plan from, relative to data_dir; empty: scans")
     plan_scans: Annotated[int, Ge(2), Le(12)] = _(6, "planner: largest number of scans")
     kriging_range_m: Positive = _(2.0, "distance over which density is alike, for the fill")
     kriging_neighbours: Annotated[int, Ge(3), Le(64)] = _(16, "known cells that fill a cell")

@@ -210,6 +210,7 @@ def places(
     cell_size_m: float,
     scanned_m: np.ndarray,
     along: int,
+    height_m: float,
     densest_m2_m3: float = 1.0,
 ) -> np.ndarray:
     """Places of scans that there are, then a grid of free ones at their mean height.
@@ -224,6 +225,8 @@ def places(
         Positions of the scans [m].
     along : int
         Places along each edge.
+    height_m : float
+        Height of the places where there is no scan yet [m].
     densest_m2_m3 : float
         No scanner is put into a cell with more.
 
@@ -232,8 +235,10 @@ def places(
     (k + n, 3) float64
     """
     size_m = np.array(density_m2_m3.shape) * cell_size_m
-    grid_m = candidates(size_m, float(scanned_m[:, 2].mean()), along)
+    height_m = float(scanned_m[:, 2].mean()) if len(scanned_m) else height_m
+    grid_m = candidates(size_m, height_m, along)
     index = np.clip((grid_m / cell_size_m).astype(int), 0, np.array(density_m2_m3.shape) - 1)
     free = density_m2_m3[tuple(index.T)] <= densest_m2_m3
-    apart = np.linalg.norm(grid_m[:, None, :2] - scanned_m[None, :, :2], axis=-1).min(axis=1)
+    between = np.linalg.norm(grid_m[:, None, :2] - scanned_m[None, :, :2], axis=-1)
+    apart = between.min(axis=1, initial=np.inf)
     return np.concatenate([scanned_m, grid_m[free & (apart > cell_size_m)]])
