@@ -25,3 +25,13 @@ rule all:
     default_target: True
     input:
         targets(),
+
+
+include: "rules/chlorophyll_common.smk"
+include: "rules/plots.smk"
+include: "rules/crowns.smk"
+include: "rules/images.smk"
+include: "rules/retrieval.smk"
+include: "rules/stability_common.smk"
+include: "rules/stability.smk"
+include: "rules/verdict.smk"

@@ -43,6 +43,7 @@ if settings.source != "wood":
         params:
             **settings.polygons.model_dump(exclude={"voxel_size_m"}),
             voxel_size_m=lambda wildcards: float(wildcards.size),
+            correction=None,
             seed=stream("polygons"),
         message:
             "{settings.experiment}: polygons from {wildcards.size} m voxels"

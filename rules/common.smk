@@ -167,8 +167,42 @@ SURVEY_FILES = (
 )
 
 
+CHLOROPHYLL_FILES = (
+    "chlorophyll/accuracy.csv",
+    "chlorophyll/map.tif",
+    *(
+        f"chlorophyll/{plot}_{figure}.png"
+        for plot in settings.chlorophyll.plots
+        for figure in ("map", "field", "simulated", "spectra", "losses")
+    ),
+)
+STABILITY_FILES = (
+    "stability/points.csv",
+    "stability/thresholds.csv",
+    "stability/published.csv",
+    "stability/map.png",
+    "stability/curves.png",
+)
+
+
+def clumping_correction(wildcards):
+    """Parameters of the voxels' correction, with the finer size that it looks into, or None."""
+    if not settings.corrections.clumping:
+        return None
+    ratio = float(wildcards.size) / (finest := min(settings.voxels.sizes_m))
+    is_multiple = ratio > 1.5 and abs(ratio - round(ratio)) < 1e-6
+    return {
+        "finer_m": finest if is_multiple else None,
+        "fill_range_m": settings.corrections.fill_range_m,
+    }
+
+
 def targets():
     """What a plain run makes."""
+    if settings.chlorophyll.enabled:
+        return [results("config.yaml"), *map(results, CHLOROPHYLL_FILES)]
+    if settings.stability.enabled:
+        return [results("config.yaml"), *map(results, STABILITY_FILES)]
     if settings.survey.enabled:
         return [results("config.yaml"), *(results(f"survey/{f}") for f in SURVEY_FILES)]
     wanted = ["config.yaml", "classes/scores.json"]
@@ -188,4 +222,5 @@ def targets():
             "figures/boxplot.png",
             "figures/scatter.png",
         ]
+    wanted += ["verdict.json"]
     return [results(path) for path in [*wanted, "runtime.csv", "report.html"]]

@@ -13,6 +13,11 @@ if settings.source != "wood":
     rule polygons:
         input:
             cloud=results("classes/cloud.laz"),
+            voxels=(
+                results(f"structure/voxels_{min(settings.voxels.sizes_m)}/voxels.nc")
+                if settings.corrections.occlusion
+                else []
+            ),
             truth=(
                 results("structure/truth/summary.json")
                 if settings.source == "virtual"
@@ -34,6 +39,11 @@ if settings.source != "wood":
             mem_mb=2000,
         params:
             **dict(settings.polygons),
+            correction=(
+                {"fill_range_m": settings.corrections.fill_range_m}
+                if settings.corrections.occlusion
+                else None
+            ),
             seed=stream("polygons"),
         message:
             "{settings.experiment}: polygons from {params.voxel_size_m} m voxels"
@@ -111,6 +121,7 @@ rule voxels:
         mem_mb=2000,
     params:
         **settings.voxels.model_dump(exclude={"sizes_m"}),
+        correction=clumping_correction,
         majority_voxel_m=settings.classify.majority_voxel_m,
     message:
         "{settings.experiment}: plant area density in {wildcards.size} m voxels"

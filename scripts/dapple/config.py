@@ -25,7 +25,9 @@ from dapple.config_base import (
     Share,
 )
 from dapple.config_base import parameter as _
+from dapple.config_chlorophyll import Chlorophyll
 from dapple.config_light import Advice, Light, Tradeoff
+from dapple.config_stability import Stability
 from dapple.config_survey import Survey
 
 
@@ -156,6 +158,16 @@ class Voxels(Section):
     beam_divergence_mrad: NotNegative = _(0.0, "weight shots by their beam's section; 0: equally")
     beam_diameter_m: NotNegative = _(0.0, "beam's diameter at the scanner, for that weight")
     allow_missing_misses: bool = _(False, "go on where every shot of a scan has a return")
+
+
+class Corrections(Section):
+    """What a scan did not see, made up for."""
+
+    occlusion: bool = _(
+        False, "add leaf polygons where coverage is poor", "after Van der Zande et al. 2008"
+    )
+    clumping: bool = _(False, "give voxels the effective density that light meets")
+    fill_range_m: Positive = _(0.5, "unknown voxels are like known ones within about this distance")
 
 
 class Site(Section):
@@ -313,6 +325,7 @@ class Settings(Section):
     classify: Classify = Classify()
     polygons: Polygons = Polygons()
     voxels: Voxels = Voxels()
+    corrections: Corrections = Corrections()
     site: Site = Site()
     time: Time = Time()
     radiation: Radiation = Radiation()
@@ -326,6 +339,8 @@ class Settings(Section):
     statistics: Statistics = Statistics()
     figures: Figures = Figures()
     survey: Survey = Survey()
+    chlorophyll: Chlorophyll = Chlorophyll()
+    stability: Stability = Stability()
     tools: Tools = Tools()
 
 

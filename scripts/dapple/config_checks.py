@@ -83,7 +83,16 @@ def check(settings: Settings, where: str) -> None:
     where : str
         The files that they come from.
     """
-    for rule in (_reconstructions, _paths, _misses, _measured, _registration, _timesteps, _spectra):
+    for rule in (
+        _reconstructions,
+        _paths,
+        _misses,
+        _corrections,
+        _measured,
+        _registration,
+        _timesteps,
+        _spectra,
+    ):
         rule(settings, where)
     for section in ("site", "time", "radiation"):
         find_timezone(getattr(settings, section).timezone, f"{where}, `{section}.timezone`")
@@ -144,6 +153,18 @@ def _misses(settings: Settings, where: str) -> None:
             f"`cloud.shots: recorded` and `cloud.path: {cloud.path}`",
             "a ptx file: other formats keep no misses",
             "Export the scan as ptx, or set cloud.shots to `scan_frame` or `none`.",
+        )
+
+
+def _corrections(settings: Settings, where: str) -> None:
+    """What the scan did not see is known from its shots."""
+    wanted = [name for name in ("occlusion", "clumping") if getattr(settings.corrections, name)]
+    if wanted and settings.source == "cloud" and settings.cloud.shots == "none":
+        raise MissingMissesError(
+            where,
+            f"`corrections.{wanted[0]}: true` and `cloud.shots: none`",
+            "shots, from which coverage is known",
+            "Set cloud.shots to `recorded` or `scan_frame`, or turn the correction off.",
         )
 
 

@@ -1,0 +1,224 @@
+"""
+Settings of the chlorophyll experiment, and what its rules share. No rules here.
+
+Needs   the configuration
+Makes   nothing
+"""
+
+from itertools import product
+
+CHLOROPHYLL = settings.chlorophyll
+CROWNS = CHLOROPHYLL.crowns
+RETRIEVAL = CHLOROPHYLL.retrieval
+CROWN_NOISE = {"cell_m": CROWNS.noise_cell_m, "most_points": CROWNS.noise_points}
+
+
+wildcard_constraints:
+    plot="larch|spruce|user",
+    model="collision_orders|semi_less|prosail",
+    mask="sunlit|all",
+
+
+def plot_of(wildcards):
+    """Settings of the plot of a job."""
+    return getattr(CHLOROPHYLL, wildcards.plot)
+
+
+def plot_file(path):
+    """A file of every plot, as a pattern."""
+    return results(f"plots/{{plot}}/{path}")
+
+
+def plot_input(kind, made):
+    """A plot's `lidar`, `images` or `crowns`: the user's file, or that of the virtual plot."""
+
+    def choose(wildcards):
+        path = getattr(plot_of(wildcards), kind)
+        return data(path) if path else plot_file(made).format(plot=wildcards.plot)
+
+    return choose
+
+
+plot_lidar = plot_input("lidar", "world/lidar.laz")
+plot_images = plot_input("images", "world/images.tif")
+plot_crowns = plot_input("crowns", "world/crowns.geojson")
+
+WORLD = CHLOROPHYLL.world
+SIZES = {"height_m", "height_sd_m", "crown_radius_m", "crown_radius_sd_m"}
+SHOOTS = {"shoot_length_m", "strip_width_m", "strips_per_shoot"}
+WORLD_SHOOTS = WORLD.model_dump(include=SHOOTS)
+WORLD_LCC = {
+    "mean_ug_cm2": WORLD.lcc_mean_ug_cm2,
+    "sd_ug_cm2": WORLD.lcc_sd_ug_cm2,
+    "range_ug_cm2": WORLD.lcc_range_ug_cm2,
+}
+WORLD_FLIGHT = {
+    "height_m": WORLD.lidar_height_m,
+    "line_spacing_m": WORLD.lidar_line_spacing_m,
+    "half_swath_deg": WORLD.lidar_half_swath_deg,
+    "pulses_per_m2": WORLD.lidar_pulses_per_m2,
+    "beam_divergence_mrad": WORLD.lidar_divergence_mrad,
+    "range_noise_m": WORLD.lidar_range_noise_m,
+    "min_separation_m": WORLD.lidar_separation_m,
+    "max_returns": WORLD.lidar_returns,
+}
+WORLD_GROUND = {
+    "brightness": WORLD.soil_brightness,
+    "moisture": WORLD.soil_moisture,
+    "litter_share": WORLD.litter_share,
+    "variation": WORLD.ground_variation,
+}
+
+
+def grown_files(part):
+    """Leaves or wood of the trees of a virtual plot that all others are copies of."""
+    return [plot_file(f"world/grown_{part}_{k}.ply") for k in range(WORLD.grown_trees)]
+
+
+def plot_tree(wildcards):
+    """What a tree is like, apart from its size."""
+    plot = plot_of(wildcards)
+    return WORLD_SHOOTS | {
+        "crown_base_share": plot.crown_base_share,
+        "dbh_m": plot.dbh_m,
+    }
+
+
+def plot_light(wildcards):
+    """Sun and sky of the observed images, and how finely they are traced."""
+    plot = plot_of(wildcards)
+    return {
+        "sun_zenith_deg": plot.sun_zenith_deg,
+        "sun_azimuth_deg": plot.sun_azimuth_deg,
+        "diffuse_share": plot.diffuse_share,
+        "paths_per_pixel": WORLD.paths_per_pixel,
+    }
+
+
+def plot_planting(wildcards):
+    """Where trees may stand, and what they have to cover."""
+    plot = plot_of(wildcards)
+    return {
+        "size_m": plot.size_m,
+        "margin_m": CHLOROPHYLL.margin_m,
+        "cover_share": plot.cover,
+        "core_share": WORLD.core_share,
+    }
+
+
+def plot_own_images(wildcards):
+    """The user's images, to compare coordinate systems; those of a virtual plot fit by birth."""
+    path = plot_of(wildcards).images
+    return [data(path)] if path else []
+
+
+RANGES = (
+    "n",
+    "chlorophyll_ug_cm2",
+    "dry_matter_g_cm2",
+    "brown",
+    "soil_brightness",
+    "soil_moisture",
+)
+LEAVES_AND_SOILS = {
+    "ranges": {name: getattr(RETRIEVAL, name) for name in RANGES},
+    "combinations": RETRIEVAL.combinations,
+    "jitter_steps": RETRIEVAL.jitter_steps,
+    "chlorophyll_per_carotenoid": RETRIEVAL.chlorophyll_per_carotenoid,
+    "water_cm": RETRIEVAL.water_cm,
+    "prospect_version": RETRIEVAL.prospect_version,
+    "soil_vectors": RETRIEVAL.soil_vectors
+    and str(Path(settings.data_dir) / RETRIEVAL.soil_vectors),
+}
+SELECTION = {
+    "cell_m": RETRIEVAL.map_pixel_m,
+    "sunlit_nir": RETRIEVAL.sunlit_nir,
+    "min_share": RETRIEVAL.min_share,
+    "canopy_height_m": RETRIEVAL.canopy_height_m,
+}
+NETWORK = {
+    key: getattr(RETRIEVAL, key)
+    for key in (
+        "hidden",
+        "block",
+        "learning_rate",
+        "last_rate_share",
+        "weight_decay",
+        "batch",
+        "max_epochs",
+        "patience",
+    )
+}
+SPLIT = {"test_share": RETRIEVAL.test_share, "held_share": RETRIEVAL.held_share}
+TAUGHT = list(product(RETRIEVAL.models, RETRIEVAL.masks))
+
+
+def retrieval_files(name, plots=CHLOROPHYLL.plots):
+    """A file of every plot, model and mask."""
+    return [
+        results(f"plots/{plot}/retrieval/{name.format(model=model, mask=mask)}")
+        for plot in plots
+        for model, mask in TAUGHT
+    ]
+
+
+def of_plot(name):
+    """A file of every model and mask of the plot of a job."""
+    return lambda wildcards: retrieval_files(name, [wildcards.plot])
+
+
+def networks_of(wildcards):
+    """Networks of all seeds that learned from one training set."""
+    name = f"retrieval/network_{wildcards.model}_{wildcards.mask}"
+    path = plot_file(name).format(plot=wildcards.plot)
+    return [f"{path}_{seed}.npz" for seed in RETRIEVAL.seeds]
+
+
+def histories_of(wildcards):
+    """Loss curves of all networks of a plot."""
+    return [
+        path
+        for seed in RETRIEVAL.seeds
+        for path in retrieval_files(
+            f"history_{{model}}_{{mask}}_{seed}.csv", [wildcards.plot]
+        )
+    ]
+
+
+def split_seed(wildcards):
+    """Seed of the division of a plot's training sets, the same for all models and networks."""
+    return stream("split", wildcards.plot)
+
+
+def simulation(wildcards):
+    """What the images of a model are made from."""
+    made = {
+        "collision_orders": {"simulation": "images/coefficients.nc"},
+        "semi_less": {"simulation": "images/semiless.nc"},
+        "prosail": {"simulation": "scene/leaves.ply"},
+    }[wildcards.model]
+    return {
+        key: plot_file(path).format(plot=wildcards.plot) for key, path in made.items()
+    }
+
+
+def simulated_light(wildcards):
+    """Sun, sky and bark of the simulated images."""
+    plot = plot_of(wildcards)
+    return {
+        "sun_zenith_deg": plot.sun_zenith_deg,
+        "diffuse_share": plot.diffuse_share,
+        "bark": CHLOROPHYLL.images.bark_reflectance,
+    }
+
+
+IMAGES = CHLOROPHYLL.images
+
+
+def plot_sun(wildcards):
+    """Where the sun stands over a plot."""
+    plot = plot_of(wildcards)
+    return {
+        "zenith_deg": plot.sun_zenith_deg,
+        "azimuth_deg": plot.sun_azimuth_deg,
+    }

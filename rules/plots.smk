@@ -1,0 +1,120 @@
+"""
+Plots: virtual conifers, UAV LiDAR and UAV images with known chlorophyll.
+
+Needs   nothing; a rule runs only for what the user gives no file of
+Makes   plots/{plot}/world/trees.csv       trees in world coordinates, their size and chlorophyll
+        plots/{plot}/world/crowns.geojson  outlines of the field trees
+        plots/{plot}/world/terrain.ply     the true ground
+        plots/{plot}/world/grown_*.ply     leaves and wood of the trees that others are copies of
+        plots/{plot}/world/lidar.laz       returns of a UAV's laser scanner
+        plots/{plot}/world/images.tif      reflectance in five bands, as a UAV's camera sees it
+"""
+
+
+rule plot_world:
+    input:
+        code=code("plot_world"),
+    output:
+        trees=plot_file("world/trees.csv"),
+        crowns=plot_file("world/crowns.geojson"),
+        terrain=plot_file("world/terrain.ply"),
+        leaves=grown_files("leaves"),
+        wood=grown_files("wood"),
+        summary=plot_file("world/summary.json"),
+    log:
+        logs("plot_world_{plot}"),
+    benchmark:
+        benchmarks("plot_world_{plot}")
+    conda:
+        "../envs/dapple.yaml"
+    threads: 1
+    resources:
+        mem_mb=1500,
+    params:
+        species=lambda wildcards: plot_of(wildcards).species,
+        sizes=lambda wildcards: plot_of(wildcards).model_dump(include=SIZES),
+        tree=plot_tree,
+        crown_leaf_area_index=lambda wildcards: plot_of(wildcards).crown_leaf_area_index,
+        grown_trees=WORLD.grown_trees,
+        planting=plot_planting,
+        field_trees=lambda wildcards: plot_of(wildcards).field_trees,
+        lcc=WORLD_LCC,
+        structure_n=WORLD.needle_structure,
+        dry_matter_g_cm2=WORLD.dry_matter_g_cm2,
+        brown=WORLD.brown,
+        terrain=WORLD.model_dump(include={"slope", "wave_height_m", "wave_length_m"}),
+        terrain_step_m=WORLD.terrain_step_m,
+        crs=WORLD.crs,
+        origin_m=WORLD.origin_m,
+        seed=lambda wildcards: stream("plot_world", wildcards.plot),
+    message:
+        "{settings.experiment}: grow the {wildcards.plot} plot"
+    script:
+        "../scripts/plot_world.py"
+
+
+rule plot_lidar:
+    input:
+        trees=plot_file("world/trees.csv"),
+        terrain=plot_file("world/terrain.ply"),
+        leaves=grown_files("leaves"),
+        wood=grown_files("wood"),
+        code=code("plot_lidar"),
+    output:
+        lidar=plot_file("world/lidar.laz"),
+        summary=plot_file("world/lidar.json"),
+    log:
+        logs("plot_lidar_{plot}"),
+    benchmark:
+        benchmarks("plot_lidar_{plot}")
+    conda:
+        "../envs/dapple.yaml"
+    threads: 2
+    resources:
+        mem_mb=6000,
+    params:
+        flight=WORLD_FLIGHT,
+        crs=WORLD.crs,
+        origin_m=WORLD.origin_m,
+        seed=lambda wildcards: stream("plot_lidar", wildcards.plot),
+    message:
+        "{settings.experiment}: scan the {wildcards.plot} plot from a UAV"
+    script:
+        "../scripts/plot_lidar.py"
+
+
+rule plot_images:
+    input:
+        trees=plot_file("world/trees.csv"),
+        terrain=plot_file("world/terrain.ply"),
+        leaves=grown_files("leaves"),
+        wood=grown_files("wood"),
+        code=code("plot_images"),
+    output:
+        images=plot_file("world/images.tif"),
+        summary=plot_file("world/images.json"),
+    log:
+        logs("plot_images_{plot}"),
+    benchmark:
+        benchmarks("plot_images_{plot}")
+    conda:
+        "../envs/dapple.yaml"
+    threads: 2
+    resources:
+        mem_mb=5000,
+    params:
+        size_m=lambda wildcards: plot_of(wildcards).size_m,
+        pixel_m=lambda wildcards: plot_of(wildcards).pixel_m,
+        light=plot_light,
+        noise={"relative": WORLD.relative_noise, "absolute": WORLD.absolute_noise},
+        ground=WORLD_GROUND,
+        lowest_to_highest_lcc=WORLD.lowest_to_highest_lcc,
+        lcc_layers=WORLD.lcc_layers,
+        water_cm=WORLD.water_cm,
+        crs=WORLD.crs,
+        origin_m=WORLD.origin_m,
+        seed=lambda wildcards: stream("plot_images", wildcards.plot),
+    message:
+        "{settings.experiment}: photograph the {wildcards.plot} plot"
+    script:
+        "../scripts/plot_images.py"

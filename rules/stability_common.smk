@@ -1,0 +1,101 @@
+"""
+Settings of the stability map, and what its rules share. No rules here.
+
+Needs   the configuration
+Makes   nothing
+"""
+
+STABILITY = settings.stability
+STABILITY_WORLDS = range(1, STABILITY.seeds + 1)
+STABILITY_BASE = (
+    "leaves.ply",
+    "wood.ply",
+    "shots.parquet",
+    "cloud.laz",
+    "seconds.json",
+)
+# Finer scans and needles fill memory; what they need was measured.
+STABILITY_LARGE = {"angular_step": 9000, "leaf_size": 5000}
+
+if STABILITY.enabled:
+    from dapple.light.series import DIRECT_SHARE
+    from dapple.stability import stressors as dapple_stressors
+
+    try:
+        STABILITY_STRESSORS = [
+            dapple_stressors.find(name).name
+            for name in STABILITY.stressors or dapple_stressors.STRESSORS
+        ]
+    except InputError as error:
+        sys.exit(f"dapple: {error}")
+else:
+    STABILITY_STRESSORS, DIRECT_SHARE = [], 1.0
+
+
+def stability_setup():
+    """The configured run that stressors disturb, as `stability.world.Setup` takes it."""
+    transport = settings.light.transport
+    return {
+        "plant": settings.plant.model_dump(),
+        "scan": settings.scan.model_dump(),
+        "clean": settings.clean.model_dump(exclude={"distance_points"})
+        | {"pdal": settings.tools.pdal, "cloudcompare": settings.tools.cloudcompare},
+        "classify": settings.classify.model_dump(),
+        "polygons": settings.polygons.model_dump(),
+        "voxels": settings.voxels.model_dump(exclude={"sizes_m"}),
+        "leaves": settings.leaves.model_dump(),
+        "sensors": settings.sensors.model_dump(exclude={"kind", "path"}),
+        "site": SKY["site"],
+        "time": dict(settings.time),
+        "radiation": SKY["radiation"],
+        "atmosphere": SKY["atmosphere"],
+        "ground_z_m": settings.ground_z_m,
+        "light": {
+            "variant": f"{VARIANT}_rgb",
+            "sun_diameter_deg": settings.light.sun_diameter_deg,
+            "aperture_m": settings.light.aperture_m,
+            "sky_rays": transport.sky_rays,
+            "paths": transport.paths,
+            "sky_patches": transport.sky_patches,
+            "max_orders": transport.max_orders,
+            "max_shadow_rays": transport.max_shadow_rays,
+            "sun_kernel_deg": transport.sun_kernel_deg,
+            "shadow_tolerance": DIRECT_SHARE * transport.tolerance,
+            "bands": STABILITY.bands,
+            "truth_factor": STABILITY.truth_factor,
+        },
+    }
+
+
+def stability_seed(wildcards):
+    """The seed of a world."""
+    return stream("stability", wildcards.world)
+
+
+def stability_base(wildcards):
+    """The undisturbed world that batches share."""
+    files = (*STABILITY_BASE, "undisturbed.csv")
+    return {
+        name.split(".")[0]: results(f"stability/base/{wildcards.world}/{name}")
+        for name in files
+    }
+
+
+def stability_memory(wildcards):
+    """Memory of a batch [MB]."""
+    return STABILITY_LARGE.get(wildcards.stressor, 3000)
+
+
+def stability_batches():
+    """One table a stressor and world."""
+    return [
+        results(f"stability/batches/{stressor}_{world}.csv")
+        for stressor in STABILITY_STRESSORS
+        for world in STABILITY_WORLDS
+    ]
+
+
+def stability_model():
+    """The fitted verdict; none before one was fitted to a first map."""
+    path = Path("scripts/dapple/stability/verdict_model.json")
+    return str(path) if (Path(workflow.basedir) / path).is_file() else []

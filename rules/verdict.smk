@@ -1,0 +1,84 @@
+"""
+Verdict: how far a run can be trusted, from what it leaves behind alone.
+
+Needs   classes/cloud.laz; scan/shots.parquet, structure/, light/, sky/ and statistics/records.csv as far
+        as the run makes them
+Makes   verdict.json      green, amber or red for every reconstruction, with reasons and remedies
+        stability/verdict_model.json, verdict.csv   fitted to stress runs; detection and false alarms
+"""
+
+JUDGED = [name for name in settings.reconstructions if name != "truth"]
+
+
+rule verdict:
+    input:
+        cloud=results("classes/cloud.laz"),
+        shots=(
+            results("scan/shots.parquet")
+            if settings.source != "cloud" or settings.cloud.shots != "none"
+            else []
+        ),
+        leaves=leaf_meshes("polygons") if "polygons" in JUDGED else [],
+        wood=(
+            results("structure/polygons/wood.ply")
+            if LIT or "polygons" in JUDGED
+            else []
+        ),
+        voxels=[
+            results(f"structure/{name}/voxels.nc")
+            for name in JUDGED
+            if name.startswith("voxels_")
+        ],
+        light=[results(f"light/{name}.nc") for name in JUDGED if name in LIT],
+        sky=results("sky/sky.nc") if LIT else [],
+        sensors=results("sky/sensors.csv") if LIT else [],
+        records=results("statistics/records.csv") if COMPARED else [],
+        model="scripts/dapple/stability/verdict_model.json",
+        code=code("verdict"),
+    output:
+        verdict=results("verdict.json"),
+    log:
+        logs("verdict"),
+    benchmark:
+        benchmarks("verdict")
+    conda:
+        "../envs/dapple.yaml"
+    threads: 2
+    resources:
+        mem_mb=4000,
+    params:
+        methods=JUDGED,
+        polygon_voxel_m=(
+            settings.polygons.voxel_size_m if settings.source != "wood" else None
+        ),
+        ground_z_m=settings.ground_z_m,
+        variant=f"{VARIANT}_mono",
+        sun_diameter_deg=settings.light.sun_diameter_deg,
+        aperture_m=settings.light.aperture_m,
+        seed=stream("verdict"),
+    message:
+        "{settings.experiment}: how far the run can be trusted"
+    script:
+        "../scripts/verdict.py"
+
+
+rule stability_verdict:
+    input:
+        points=results("stability/points.csv"),
+        code=code("stability_verdict"),
+    output:
+        model=results("stability/verdict_model.json"),
+        rates=results("stability/verdict.csv"),
+    log:
+        logs("stability_verdict"),
+    benchmark:
+        benchmarks("stability_verdict")
+    conda:
+        "../envs/dapple.yaml"
+    threads: 1
+    resources:
+        mem_mb=500,
+    message:
+        "{settings.experiment}: which signals go with failures"
+    script:
+        "../scripts/stability_verdict.py"
