@@ -5,6 +5,7 @@ from pathlib import Path
 
 import laspy
 import numpy as np
+import pyproj
 
 from dapple import frames
 from dapple.errors import InputError
@@ -23,7 +24,10 @@ STANDARD = {
     "Green": "green",
     "Blue": "blue",
 }
-WRITABLE = {name for name in STANDARD if name not in ("Red", "Green", "Blue")}
+FIELDS = {*STANDARD, "ScanAngle"}
+WRITABLE = FIELDS - {"Red", "Green", "Blue"}
+SCAN_ANGLE_STEP_DEG = 0.006
+"""Step of the field `scan_angle` of point formats 6 to 10; older ones count whole degrees."""
 VLR_USER, VLR_ID = "dapple", 1
 """Names the standard fields that mean something: LAS cannot tell class 0 from never classified."""
 
@@ -51,7 +55,7 @@ def read(path: Path) -> RawCloud:
     kept = {
         name: values
         for name, values in attributes.items()
-        if name in named or name not in STANDARD or (named == set() and values.any())
+        if name in named or name not in FIELDS or (named == set() and values.any())
     }
     return RawCloud(xyz, origin, kept)
 
@@ -62,16 +66,18 @@ def iterate(path: Path, chunk: int) -> Iterator[RawCloud]:
         yield raw
 
 
-def write(path: Path, raw: RawCloud, scale_m: float = 1e-4) -> None:
+def write(path: Path, raw: RawCloud, scale_m: float = 1e-4, crs: str | None = None) -> None:
     """Write LAS 1.4, point format 6; LAZ by suffix.
 
     Attributes without a field in the point format become extra dimensions: float32 where that
-    holds the numbers, integers as they are.
+    holds the numbers, integers as they are. `crs` names the coordinate system, as "EPSG:25832".
     """
     header = laspy.LasHeader(point_format=6, version="1.4")
     header.offsets, header.scales = raw.origin_m, np.full(3, scale_m)
     header.generating_software = "dapple"
     header.global_encoding.wkt = True  # point formats 6 to 10 ask for it, PDAL complains without
+    if crs is not None:
+        header.add_crs(pyproj.CRS(crs))
     extra = {name: _storable(v) for name, v in raw.attributes.items() if name not in WRITABLE}
     header.add_extra_dims([laspy.ExtraBytesParams(n, v.dtype) for n, v in extra.items()])
     names = ",".join(name for name in raw.attributes if name in WRITABLE)
@@ -90,6 +96,9 @@ def write(path: Path, raw: RawCloud, scale_m: float = 1e-4) -> None:
     for name in ("return_number", "number_of_returns"):
         record[name] = np.ones(len(raw.xyz_m), np.uint8)
     for name, values in raw.attributes.items():
+        if name == "ScanAngle":
+            record["scan_angle"] = np.rint(values / SCAN_ANGLE_STEP_DEG).astype(np.int16)
+            continue
         record[STANDARD[name] if name in WRITABLE else name] = (
             extra[name] if name in extra else _whole(path, name, values)
         )
@@ -173,6 +182,10 @@ def _chunk(points, header: laspy.LasHeader, origin: np.ndarray) -> RawCloud:
             xyz[:, axis] += shift[axis]
     present = set(header.point_format.dimension_names)
     attributes = {n: np.array(points[f]) for n, f in STANDARD.items() if f in present}
+    if "scan_angle" in present:
+        attributes["ScanAngle"] = np.float32(SCAN_ANGLE_STEP_DEG) * np.array(points["scan_angle"])
+    elif "scan_angle_rank" in present:
+        attributes["ScanAngle"] = np.array(points["scan_angle_rank"], np.float32)
     for name in header.point_format.extra_dimension_names:
         if name not in PDAL_OWN:
             attributes[attribute_name(name)] = np.array(points[name])

@@ -112,7 +112,8 @@ def write(path: str | Path, cloud: Cloud, **options) -> None:
     cloud : Cloud
         What to write; floating-point attributes become float32 where they fit.
     **options
-        `scale_m` for LAS and LAZ: the step of the stored coordinates (0.0001 m).
+        For LAS and LAZ: `scale_m`, the step of the stored coordinates (0.0001 m), and `crs`, the
+        coordinate system, as in "EPSG:25832".
     """
     path = Path(path)
     writer = _by_suffix(path, WRITERS, "write")

@@ -28,3 +28,16 @@ def read(leaves: Sequence[str], wood: str, ground_z_m: float = 0.0) -> list[Scen
             leaf = meshes.read_ply(path)
             scenes.append(Scene({"leaf": leaf, "wood": branches}, None, ground_z_m))
     return scenes
+
+
+def read_plot(leaves: str, terrain: str) -> Scene:
+    """Put together a plot: facets over terrain, and flat ground at its lowest point around it.
+
+    Parameters
+    ----------
+    leaves, terrain : path
+        PLY meshes in one local frame.
+    """
+    ground = meshes.read_ply(terrain)
+    lowest = float(ground.vertices_m[:, 2].min())
+    return Scene({"leaf": meshes.read_ply(leaves), "ground": ground}, ground_z_m=lowest)

@@ -1,4 +1,4 @@
-"""The spectral bands in which dapple computes: 400 to 700 nm, photosynthetically active."""
+"""The spectral bands in which dapple computes: photosynthetically active, and of a camera."""
 
 import numpy as np
 from scipy.constants import Avogadro, Planck, speed_of_light
@@ -6,6 +6,10 @@ from scipy.integrate import cumulative_trapezoid
 
 PAR_RANGE_NM = (400.0, 700.0)
 BAND_STEP_NM = 5.0
+# The bands of a multispectral UAV camera: blue, green, red, red edge, near infrared (Zhao et al.
+# 2025), taken as flat between centre minus and centre plus half the width.
+CAMERA_NM = (450.0, 560.0, 650.0, 730.0, 840.0)
+CAMERA_HALF_WIDTH_NM = (16.0, 16.0, 16.0, 16.0, 26.0)
 
 
 def par_bands(step_nm: float = BAND_STEP_NM) -> np.ndarray:
@@ -42,15 +46,48 @@ def band_mean(wavelength_nm: np.ndarray, values: np.ndarray, centres_nm: np.ndar
     (..., b) float64
         Exact means of the piecewise linear spectrum.
     """
-    wavelength, values = np.asarray(wavelength_nm, float), np.asarray(values, float)
     edges = band_edges(centres_nm)
-    inside = (wavelength > edges[0]) & (wavelength < edges[-1])
-    nodes = np.union1d(wavelength[inside], edges)
+    return window_mean(wavelength_nm, values, edges[:-1], edges[1:])
+
+
+def window_mean(
+    wavelength_nm: np.ndarray, values: np.ndarray, low_nm: np.ndarray, high_nm: np.ndarray
+) -> np.ndarray:
+    """Average a tabulated spectrum, linear between its wavelengths, over each window.
+
+    Parameters
+    ----------
+    wavelength_nm : (k,) float
+        Ascending wavelengths of the table [nm]; they must cover the windows.
+    values : (..., k) float
+        The spectrum.
+    low_nm, high_nm : (b,) float
+        Edges of the windows [nm], which may overlap or leave gaps.
+
+    Returns
+    -------
+    (..., b) float64
+        Exact means of the piecewise linear spectrum.
+    """
+    wavelength, values = np.asarray(wavelength_nm, float), np.asarray(values, float)
+    low, high = np.asarray(low_nm, float), np.asarray(high_nm, float)
+    first, last = low.min(), high.max()
+    inside = (wavelength > first) & (wavelength < last)
+    nodes = np.union1d(wavelength[inside], np.concatenate([low, high]))
     right = np.clip(np.searchsorted(wavelength, nodes), 1, len(wavelength) - 1)
     share = (nodes - wavelength[right - 1]) / (wavelength[right] - wavelength[right - 1])
     at_nodes = values[..., right - 1] * (1 - share) + values[..., right] * share
     integral = cumulative_trapezoid(at_nodes, nodes, axis=-1, initial=0.0)
-    return np.diff(integral[..., np.searchsorted(nodes, edges)], axis=-1) / np.diff(edges)
+    at_edges = (integral[..., np.searchsorted(nodes, edge)] for edge in (high, low))
+    return np.subtract(*at_edges) / (high - low)
+
+
+def camera_windows(
+    centres_nm: np.ndarray = CAMERA_NM, half_width_nm: np.ndarray = CAMERA_HALF_WIDTH_NM
+) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper edges (b,) of a camera's bands [nm]."""
+    centres, half = np.asarray(centres_nm, float), np.asarray(half_width_nm, float)
+    return centres - half, centres + half
 
 
 def photon_flux(irradiance_w_m2: np.ndarray, wavelength_nm: np.ndarray) -> np.ndarray:

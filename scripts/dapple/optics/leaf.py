@@ -3,7 +3,13 @@
 import numpy as np
 
 from dapple.errors import InputError
-from dapple.optics.bands import band_mean
+from dapple.optics.bands import (
+    CAMERA_HALF_WIDTH_NM,
+    CAMERA_NM,
+    band_mean,
+    camera_windows,
+    window_mean,
+)
 
 # What PROSPECT was calibrated on, generously: beyond it the model runs, and means nothing.
 LEAF_RANGES = {
@@ -73,22 +79,78 @@ def leaf_spectra(
         "water_cm": water_cm,
         "dry_matter_g_cm2": dry_matter_g_cm2,
     }
-    _check(leaf, prospect_version)
-    import prosail  # takes seconds to import, and only this function needs it
-
-    table_nm, reflectance, transmittance = prosail.run_prospect(
-        n,
-        chlorophyll_ug_cm2,
-        carotenoids_ug_cm2,
-        brown,
-        water_cm,
-        dry_matter_g_cm2,
-        ant=anthocyanin_ug_cm2,
-        prospect_version=prospect_version,
-    )
+    table_nm, reflectance, transmittance = _prospect(leaf, prospect_version)
     return (
         band_mean(table_nm, reflectance, wavelength_nm),
         band_mean(table_nm, transmittance, wavelength_nm),
+    )
+
+
+def camera_leaves(
+    *,
+    n: np.ndarray | float = 1.5,
+    chlorophyll_ug_cm2: np.ndarray | float = 45.0,
+    carotenoids_ug_cm2: np.ndarray | float = 9.0,
+    anthocyanin_ug_cm2: np.ndarray | float = 0.0,
+    brown: np.ndarray | float = 0.0,
+    water_cm: np.ndarray | float = 0.012,
+    dry_matter_g_cm2: np.ndarray | float = 0.006,
+    prospect_version: str = "D",
+    centres_nm: np.ndarray = CAMERA_NM,
+    half_width_nm: np.ndarray = CAMERA_HALF_WIDTH_NM,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Reflectance and transmittance of many leaves in the bands of a camera.
+
+    Parameters
+    ----------
+    n, chlorophyll_ug_cm2, ..., dry_matter_g_cm2 : float or (k,) array
+        As in `leaf_spectra`; they are broadcast against each other.
+    prospect_version : {"5", "D"}
+        Which calibration of the absorption coefficients.
+    centres_nm, half_width_nm : (b,) float
+        Bands [nm], flat from centre minus to centre plus half the width, within 400 to 2500.
+
+    Returns
+    -------
+    reflectance, transmittance : (k, b) float64
+        Directional-hemispherical, 0 to 1.
+
+    Raises
+    ------
+    InputError
+        A parameter is outside the range in `LEAF_RANGES`.
+    """
+    columns = np.broadcast_arrays(
+        *np.atleast_1d(
+            n, chlorophyll_ug_cm2, carotenoids_ug_cm2, anthocyanin_ug_cm2, brown, water_cm,
+            dry_matter_g_cm2,
+        )
+    )  # fmt: skip
+    low, high = camera_windows(centres_nm, half_width_nm)
+    both = np.empty((2, len(columns[0]), len(low)))
+    for k, row in enumerate(zip(*columns, strict=True)):
+        leaf = {name: float(value) for name, value in zip(LEAF_RANGES, row, strict=True)}
+        table_nm, *spectra = _prospect(leaf, prospect_version)
+        both[:, k] = window_mean(table_nm, np.array(spectra), low, high)
+    return both[0], both[1]
+
+
+def _prospect(
+    leaf: dict[str, float], prospect_version: str
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Wavelengths [nm], 400 to 2500 in steps of 1, reflectance and transmittance."""
+    _check(leaf, prospect_version)
+    import prosail  # takes seconds to import, and only this function needs it
+
+    return prosail.run_prospect(
+        leaf["n"],
+        leaf["chlorophyll_ug_cm2"],
+        leaf["carotenoids_ug_cm2"],
+        leaf["brown"],
+        leaf["water_cm"],
+        leaf["dry_matter_g_cm2"],
+        ant=leaf["anthocyanin_ug_cm2"],
+        prospect_version=prospect_version,
     )
 
 

@@ -1,0 +1,227 @@
+"""Images of a virtual plot from above, by Mitsuba's own path tracer: every material its own colour.
+
+Nothing is shared with the simulated images that chlorophyll is retrieved with, but Mitsuba's rays:
+leaves are strips of needles and not facets, every tree has its own optics, the ground is patchy,
+paths have no largest order, and light is traced band by band in Mitsuba's integrator.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dapple import engine
+from dapple.errors import InputError
+from dapple.formats.meshes import Mesh
+from dapple.frames import direction_from_angles
+from dapple.light import patterns
+from dapple.light.mitsuba_plugins import register
+from dapple.light.mitsuba_scene import RenderScene, _looking, _mesh, _sky
+from dapple.streams import stream_seed
+from dapple.virtual.plot_optics import Materials
+
+CHUNK_RAYS = 1 << 20
+"""Rays traced together: always this many, so that one kernel serves and memory stays small."""
+
+ROULETTE_DEPTH = 3
+"""Weak paths are ended by chance from here on; without a largest order nothing is cut off."""
+
+SUN_WEIGHT = 4.0
+"""So often is the sun asked for light where the sky is asked once: about its share of the light."""
+
+
+@dataclass(frozen=True)
+class Camera:
+    """An orthographic camera that looks straight down on whole pixels of a north-up grid.
+
+    Attributes
+    ----------
+    left_m, top_m : float
+        North-west corner, local frame [m].
+    rows, columns : int
+    pixel_m : float
+        Edge of a pixel [m].
+    """
+
+    left_m: float
+    top_m: float
+    rows: int
+    columns: int
+    pixel_m: float
+
+    @classmethod
+    def over(cls, size_m: tuple[float, float], pixel_m: float) -> "Camera":
+        """The whole pixels of a plot from 0, 0 to its size, from the north-west corner."""
+        columns, rows = (int(edge / pixel_m + 1e-6) for edge in size_m)
+        if rows < 1 or columns < 1:
+            raise InputError(
+                "chlorophyll.pixel_m",
+                f"{pixel_m:g} m in a plot of {size_m[0]:g} x {size_m[1]:g} m",
+                "pixels smaller than the plot",
+                "Choose smaller pixels.",
+            )
+        return cls(0.0, float(size_m[1]), rows, columns, pixel_m)
+
+
+@dataclass
+class PaintedScene:
+    """A Mitsuba scene of one mesh whose colours can be changed without rebuilding it."""
+
+    render: RenderScene
+    bsdf: Any
+    materials: Materials
+    top_m: float
+
+    def paint(self, bands: list[int]) -> None:
+        """Use up to three bands as Mitsuba's colours; missing ones repeat the last."""
+        chosen = [bands[min(k, len(bands) - 1)] for k in range(3)]
+        self.bsdf.paint(
+            self.materials.reflectance[:, chosen], self.materials.transmittance[:, chosen]
+        )
+
+
+def build(mesh: Mesh, materials: Materials, *, variant: str = "llvm_ad_rgb") -> PaintedScene:
+    """Put a world of any materials into a Mitsuba scene.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Everything: leaves, wood, ground.
+    materials : Materials
+        Opaque ones have no transmittance.
+
+    Raises
+    ------
+    InputError
+        Reflectance and transmittance below 0 or together above 1.
+    """
+    total = materials.reflectance + materials.transmittance
+    lowest = min(materials.reflectance.min(), materials.transmittance.min())
+    if lowest < 0 or total.max() > 1 + 1e-6:
+        raise InputError(
+            "materials",
+            f"shares of light from {lowest:.3g} to {total.max():.3g}",
+            "0 to 1, reflectance and transmittance together too",
+            "Check the spectra.",
+        )
+    mi = engine.load(variant)
+    register()
+    bsdf = mi.load_dict({"type": "painted"})
+    bsdf.assign(materials.of_face.astype(np.uint32))
+    shape = (181, 360)
+    content = {
+        "type": "scene",
+        "sun": {
+            "type": "directional",
+            "to_world": _looking(mi, np.array([0.0, 0.0, -1.0])),
+            "irradiance": {"type": "rgb", "value": [0.0, 0.0, 0.0]},
+            "sampling_weight": SUN_WEIGHT,
+        },
+        "sky": _sky(mi, shape) | {"sampling_weight": 1.0},
+        "world": _mesh(mi, "world", mesh, bsdf),
+    }
+    low, high = mesh.vertices_m[:, 2].min(), mesh.vertices_m[:, 2].max()
+    render = RenderScene(mi, mi.load_dict(content), 3, float(low), variant, 0.0, shape)
+    return PaintedScene(render, bsdf, materials, float(high))
+
+
+def photograph(
+    scene: PaintedScene,
+    camera: Camera,
+    *,
+    sun_zenith_deg: float,
+    sun_azimuth_deg: float,
+    diffuse_share: np.ndarray,
+    paths_per_pixel: int,
+    seed: int,
+) -> np.ndarray:
+    """Reflectance of every pixel in every band.
+
+    Parameters
+    ----------
+    scene : PaintedScene
+    camera : Camera
+    sun_zenith_deg, sun_azimuth_deg : float
+        Azimuth clockwise from north [°].
+    diffuse_share : (b,) float
+        Of the light on level ground: what comes from a sky of even radiance, not from the sun.
+    paths_per_pixel : int
+        Spread evenly over the pixel.
+    seed : int
+        Same seed, same image.
+
+    Returns
+    -------
+    (b, rows, columns) float32
+        pi times radiance over irradiance of level ground; row 0 in the north.
+
+    Notes
+    -----
+    Light reaches the world from the upper hemisphere alone, at its edges too: nothing repeats
+    sideways. Three bands are traced together, then the rest.
+    """
+    diffuse = np.asarray(diffuse_share, np.float64)
+    n_bands = scene.materials.reflectance.shape[1]
+    if diffuse.shape != (n_bands,) or diffuse.min() < 0 or diffuse.max() > 1:
+        raise InputError(
+            "chlorophyll.diffuse_share",
+            str(diffuse.tolist()),
+            f"{n_bands} shares from 0 to 1",
+            "Give one share for each band.",
+        )
+    towards_sun = direction_from_angles(sun_zenith_deg, sun_azimuth_deg)
+    image = np.empty((n_bands, camera.rows * camera.columns), np.float32)
+    for first in range(0, n_bands, 3):
+        bands = list(range(first, min(first + 3, n_bands)))
+        padded = np.array([bands[min(k, len(bands) - 1)] for k in range(3)])
+        scene.paint(bands)
+        scene.render.set_sun(towards_sun, (1 - diffuse[padded]) / towards_sun[2])
+        scene.render.set_sky(lambda zenith, azimuth: np.ones_like(zenith), diffuse[padded])
+        seen = _expose(scene, camera, paths_per_pixel, stream_seed(seed, "bands", first))
+        image[bands] = np.pi * seen[: len(bands)]
+    return image.reshape(n_bands, camera.rows, camera.columns)
+
+
+def _expose(scene: PaintedScene, camera: Camera, paths: int, seed: int) -> np.ndarray:
+    """Radiance (3, pixels) in the colours that the scene is painted with."""
+    mi = scene.render.mi
+    tracer = mi.load_dict({"type": "path", "max_depth": -1, "rr_depth": ROULETTE_DEPTH})
+    sampler = mi.load_dict({"type": "independent"})
+    n_pixels, at_once = camera.rows * camera.columns, max(CHUNK_RAYS // paths, 1)
+    radiance = np.empty((3, n_pixels))
+    for number, begin in enumerate(range(0, n_pixels, at_once)):
+        pixel = np.arange(begin, min(begin + at_once, n_pixels))
+        own = stream_seed(seed, number)
+        row, column = np.divmod(pixel, camera.columns)
+        place = patterns.shifted(paths, 2, (len(pixel),), own)
+        x = camera.left_m + (column[:, None] + place[..., 0]) * camera.pixel_m
+        y = camera.top_m - (row[:, None] + place[..., 1]) * camera.pixel_m
+        start = mi.Point3f(
+            mi.Float(x.ravel().astype(np.float32)),
+            mi.Float(y.ravel().astype(np.float32)),
+            mi.Float(scene.top_m + 1.0),
+        )
+        ray = mi.RayDifferential3f(start, mi.Vector3f(0.0, 0.0, -1.0))
+        sampler.seed(own, x.size)
+        colour, _, _ = tracer.sample(scene.render.scene, sampler, ray)
+        radiance[:, pixel] = np.array(colour).reshape(3, len(pixel), paths).mean(axis=2)
+    return radiance
+
+
+def with_noise(
+    image: np.ndarray, *, relative: float = 0.01, absolute: float = 0.001, seed: int
+) -> np.ndarray:
+    """Add a sensor's noise, independent between pixels and bands.
+
+    Parameters
+    ----------
+    image : (b, rows, columns) float
+        Reflectance.
+    relative : float
+        Standard deviation as a share of the value.
+    absolute : float
+        Standard deviation of a dark pixel.
+    seed : int
+    """
+    noise = np.random.default_rng(seed).standard_normal(image.shape)
+    return (image + np.hypot(relative * image, absolute) * noise).astype(np.float32)

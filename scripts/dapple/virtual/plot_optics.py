@@ -1,0 +1,168 @@
+"""Optical properties of a virtual plot: needles by tree and height, bark, and ground in patches."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import truncnorm
+
+from dapple.errors import InputError
+from dapple.formats.meshes import Mesh
+from dapple.optics.bands import CAMERA_HALF_WIDTH_NM, CAMERA_NM, camera_windows, window_mean
+from dapple.optics.leaf import camera_leaves
+from dapple.optics.soil import two_soils
+
+# Assumed: rough bark of conifers, browner and brighter towards the infrared.
+BARK_NM = (400.0, 450.0, 560.0, 650.0, 730.0, 840.0, 900.0)
+BARK = (0.06, 0.07, 0.11, 0.16, 0.23, 0.31, 0.34)
+
+# Assumed: dry litter of needles, without the green peak and the steep red edge of living leaves.
+LITTER_NM = (400.0, 450.0, 560.0, 650.0, 730.0, 840.0, 900.0)
+LITTER = (0.05, 0.06, 0.11, 0.17, 0.23, 0.31, 0.34)
+
+
+@dataclass(frozen=True)
+class Materials:
+    """What the faces of a scene are made of.
+
+    Attributes
+    ----------
+    reflectance, transmittance : (m, b) float64
+        Of each material in each band, 0 to 1.
+    of_face : (t,) int32
+        Material of each triangle.
+    """
+
+    reflectance: np.ndarray
+    transmittance: np.ndarray
+    of_face: np.ndarray
+
+
+def chlorophyll(
+    n: int,
+    *,
+    mean_ug_cm2: float = 39.9,
+    sd_ug_cm2: float = 10.8,
+    range_ug_cm2: tuple[float, float] = (10.0, 70.0),
+    seed: int,
+) -> np.ndarray:
+    """Leaf chlorophyll content (n,) of trees: a normal distribution cut off at a range [µg cm⁻²].
+
+    The defaults are those of the larches of Zhao et al. (2025).
+    """
+    low, high = range_ug_cm2
+    if not (sd_ug_cm2 > 0 and low < mean_ug_cm2 < high):
+        raise InputError(
+            "chlorophyll.world.lcc_mean_ug_cm2",
+            f"{mean_ug_cm2:g} with an SD of {sd_ug_cm2:g}",
+            f"a mean within {low:g} to {high:g} and an SD above 0",
+            "Widen lcc_range_ug_cm2 or correct the mean.",
+        )
+    cut = (np.array([low, high]) - mean_ug_cm2) / sd_ug_cm2
+    return truncnorm.rvs(
+        *cut, loc=mean_ug_cm2, scale=sd_ug_cm2, size=n, random_state=np.random.default_rng(seed)
+    )
+
+
+def layers(leaves: Mesh, n_layers: int) -> np.ndarray:
+    """Height layer (n_elements,) of every shoot of a tree: equally deep, 0 the lowest."""
+    height = np.bincount(leaves.element, leaves.vertices_m[leaves.faces, 2].mean(axis=1))
+    height /= np.bincount(leaves.element)
+    share = (height - height.min()) / max(np.ptp(height), 1e-9)
+    return np.minimum((share * n_layers).astype(np.int32), n_layers - 1)
+
+
+def layer_factor(
+    layer: np.ndarray, area_m2: np.ndarray, n_layers: int, lowest_to_highest: float
+) -> np.ndarray:
+    """Chlorophyll of each layer (n_layers,) as a multiple of the tree's mean.
+
+    Parameters
+    ----------
+    layer, area_m2 : (n_elements,)
+        Layer and area of every shoot.
+    n_layers : int
+    lowest_to_highest : float
+        Chlorophyll of the lowest over that of the highest layer; linear between.
+
+    Returns
+    -------
+    (n_layers,) float64
+        Its mean over the leaf area is 1.
+    """
+    height = np.arange(n_layers) / max(n_layers - 1, 1)
+    factor = lowest_to_highest + (1.0 - lowest_to_highest) * height
+    weight = np.bincount(layer, area_m2, n_layers)
+    return factor * weight.sum() / (factor * weight).sum()
+
+
+def needles(
+    lcc_ug_cm2: np.ndarray,
+    *,
+    structure_n: np.ndarray | float = 1.6,
+    dry_matter_g_cm2: np.ndarray | float = 0.012,
+    brown: np.ndarray | float = 0.05,
+    water_cm: float = 0.015,
+    carotenoids_per_chlorophyll: float = 0.25,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Reflectance and transmittance (n, 5) of needles with chlorophyll (n,), by PROSPECT-5."""
+    return camera_leaves(
+        n=structure_n,
+        chlorophyll_ug_cm2=lcc_ug_cm2,
+        carotenoids_ug_cm2=carotenoids_per_chlorophyll * np.asarray(lcc_ug_cm2),
+        brown=brown,
+        water_cm=water_cm,
+        dry_matter_g_cm2=dry_matter_g_cm2,
+        prospect_version="5",
+    )
+
+
+def table_in_bands(wavelength_nm, reflectance) -> np.ndarray:
+    """A tabulated spectrum in the bands of the camera (5,)."""
+    low, high = camera_windows(CAMERA_NM, CAMERA_HALF_WIDTH_NM)
+    return window_mean(np.asarray(wavelength_nm), np.asarray(reflectance), low, high)
+
+
+def ground_patches(
+    centres_m: np.ndarray,
+    *,
+    brightness: float = 0.55,
+    moisture: float = 0.4,
+    litter_share: float = 0.4,
+    variation: float = 0.2,
+    patch_m: float = 2.5,
+    seed: int,
+) -> np.ndarray:
+    """Reflectance (n, 5) of the ground at places (n, 2), in patches.
+
+    Soil of `optics.soil.two_soils` mixes with litter of needles. Two smooth textures vary them:
+    one the moisture of the soil, one the share of litter.
+
+    Parameters
+    ----------
+    centres_m : (n, 2) float64
+        Places [m].
+    brightness, moisture, litter_share : float
+        Means: of the soil's brightness and moisture, 0 to 1, and of the ground under litter.
+    variation : float
+        Standard deviation of moisture and of litter share.
+    patch_m : float
+        Typical width of patches of litter; those of moisture are twice as wide [m].
+    seed : int
+    """
+    moist = np.clip(moisture + variation * _texture(centres_m, 2 * patch_m, seed), 0, 1)
+    litter = np.clip(litter_share + variation * _texture(centres_m, patch_m, seed + 1), 0, 1)
+    soil = two_soils()(np.full(len(moist), brightness), moist)
+    litter = litter[:, None]
+    return (1 - litter) * soil + litter * table_in_bands(LITTER_NM, LITTER)
+
+
+def _texture(xy_m: np.ndarray, width_m: float, seed: int, n_waves: int = 40) -> np.ndarray:
+    """Smooth noise of mean 0 and standard deviation 1: waves of random direction and length."""
+    rng = np.random.default_rng(seed)
+    direction, phase = rng.uniform(0, 2 * np.pi, (2, n_waves))
+    number = 2 * np.pi / (width_m * rng.uniform(1.0, 4.0, n_waves))
+    vector = number[:, None] * np.stack([np.cos(direction), np.sin(direction)], axis=1)
+    total = np.zeros(len(xy_m))
+    for wave, shift in zip(vector, phase, strict=True):
+        total += np.sin(xy_m @ wave + shift)
+    return total * np.sqrt(2.0 / n_waves)
