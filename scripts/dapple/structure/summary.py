@@ -62,7 +62,10 @@ def of_voxels(dataset: xr.Dataset, wood: Mesh | None = None, truth: dict | None 
         if str(name).startswith("pad_")
     }
     return {
-        "leaf_area_m2": float(np.nansum(pad, dtype=np.float64) * voxel_m3),
+        # Densities for light, which account for clumps, do not add up to the leaf area.
+        "leaf_area_m2": dataset.attrs.get(
+            "leaf_area_before_m2", float(np.nansum(pad, dtype=np.float64) * voxel_m3)
+        ),
         "wood_area_m2": wood.area_m2 if wood else 0.0,
         "n_elements": int(leafy.sum()),
         "volume_m3": float(leafy.sum() * voxel_m3),
