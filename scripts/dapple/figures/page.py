@@ -1,4 +1,4 @@
-"""One self-contained page that tells a run: its tables, its figures, what it cost."""
+"""One self-contained page that tells a run: its verdict, its tables, its figures, what it cost."""
 
 import base64
 import html
@@ -22,11 +22,19 @@ FIGURES = {
     "figures/advice.png": "What each refinement of the light changes.",
     "tradeoff/chart.png": "Accuracy against speed.",
 }
+STATES = {
+    "green": ("#2e7d32", "nothing speaks against this light"),
+    "amber": ("#b26a00", "look at what follows before using this light"),
+    "red": ("#b71c1c", "do not use this light as it is"),
+}
 STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; }
 table { border-collapse: collapse; font-size: 0.85rem; margin: 1rem 0; }
 th, td { border-bottom: 1px solid #ccc; padding: 0.2rem 0.8rem; text-align: right; }
 th:first-child, td:first-child { text-align: left; }
+.verdict { border-left: 0.5rem solid; padding: 0.2rem 1rem; margin: 1rem 0; background: #f7f7f7; }
+.verdict h2 { margin: 0.3rem 0; } .verdict li { margin: 0.2rem 0; }
+.state { display: inline-block; padding: 0 0.6rem; border-radius: 0.4rem; color: #fff; }
 figure { margin: 1.5rem 0; } img { max-width: 100%; } figcaption { color: #555; }
 """
 
@@ -46,7 +54,7 @@ def build(experiment: str, folder: Path) -> str:
     str
         HTML.
     """
-    parts = [f"<h1>{html.escape(experiment)}</h1>", _structure(folder)]
+    parts = [f"<h1>{html.escape(experiment)}</h1>", _verdict(folder), _structure(folder)]
     for name, title in TABLES.items():
         if (path := folder / name).is_file():
             parts += [f"<h2>{title}</h2>", _table(pd.read_csv(path))]
@@ -63,6 +71,38 @@ def build(experiment: str, folder: Path) -> str:
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
         f"<style>{STYLE}</style></head><body>\n{body}\n</body></html>\n"
     )
+
+
+def _verdict(folder: Path) -> str:
+    """What the run's own signals say about it; nothing where it was not judged."""
+    if not (path := folder / "verdict.json").is_file():
+        return ""
+    judged = json.loads(path.read_text())
+    colour = STATES[judged["state"]][0]
+    parts = [f'<section class="verdict" style="border-color: {colour}">']
+    parts.append(f"<h2>Verdict: {_badge(judged['state'])}</h2>")
+    for name, facts in judged["methods"].items():
+        score = f"expected loss {facts['expected_loss']:.2f}, alarm from {facts['alarm']:.2f}"
+        parts.append(f"<p><b>{html.escape(name)}</b> {_badge(facts['state'])} ({score})</p><ul>")
+        for reason in facts["reasons"]:
+            text, remedy = (html.escape(reason[key]) for key in ("text", "help"))
+            usual = html.escape(reason["usual_text"])
+            beyond = "; beyond all that was tried" if reason["is_beyond"] else ""
+            parts.append(f"<li>{text} (undisturbed: {usual}{beyond}). {remedy}</li>")
+        parts.append("</ul>")
+    for one in judged["unknown"]:
+        parts.append(f"<p>Not known: {html.escape(one['text'])}. {html.escape(one['help'])}</p>")
+    parts.append(
+        "<p>Of loss, 1 is failure: a fifth of r lost, or error doubled, in virtual worlds.</p>"
+    )
+    if not judged["with_records"]:
+        parts.append("<p>Wrong sensor positions and clocks leave no trace in a scan.</p>")
+    return "\n".join([*parts, "</section>"])
+
+
+def _badge(state: str) -> str:
+    colour, text = STATES[state]
+    return f'<span class="state" style="background: {colour}">{state}</span> {text}'
 
 
 def _structure(folder: Path) -> str:

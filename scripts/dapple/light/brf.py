@@ -6,6 +6,7 @@ transmissions b, bark reflections c and ground reflections d: what a view receiv
 series in rho, tau, rho_bark and rho_ground whose coefficients are traced once for all bands.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import drjit as dr
@@ -222,9 +223,59 @@ def _trace_block(
     rng = mi.PCG32(initstate=mi.UInt64(state), initseq=mi.UInt64(sequence))
     view = start // dr.opaque(mi.UInt32, n_replicates)
     origin, direction = _first_rays(mi, views, view, (point, shift), number, rng)
+    keys, sums, lost = [], [], 0
+    limits = max_orders, halved_after
+    for whose, source, met_orders, brought in follow(
+        scene, start, origin, direction, rng, sun_direction, *limits
+    ):
+        if source is None:
+            lost = len(whose)
+            break
+        keys.append((whose.astype(np.int64) * 2 + source) << 32 | met_orders)
+        sums.append(brought.astype(np.float64))
+    return (np.concatenate(keys), np.concatenate(sums)), lost
+
+
+def follow(
+    scene: TracedScene,
+    start,
+    origin,
+    direction,
+    rng,
+    sun_direction: np.ndarray,
+    max_orders: int,
+    halved_after: int,
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray]]:
+    """Follow paths surface by surface and give what they bring at each.
+
+    Paths that have ended are left out after every surface: few go on for long.
+
+    Parameters
+    ----------
+    scene : TracedScene
+        What light meets.
+    start : UInt32
+        A label of each path.
+    origin, direction : Point3f, Vector3f
+        First rays.
+    rng : PCG32
+        Random numbers of each path.
+    sun_direction : (3,) float64
+        Unit vector towards the sun, above the horizon.
+    max_orders, halved_after : int
+        As in `collect`.
+
+    Yields
+    ------
+    start, source, orders, brought : (k,) arrays
+        Labels, `SUN` or `SKY`, packed orders and weighted light of the paths to which a surface,
+        or the way out, brought light. At last, with None for source and orders, the labels and
+        weights of the paths that were given up.
+    """
+    mi = scene.mi
     sun = mi.Vector3f(*(dr.opaque(mi.Float, float(x)) for x in sun_direction))
+    n = dr.width(start)
     orders, weight = dr.zeros(mi.UInt32, n), dr.full(mi.Float, 1.0, n)
-    keys, sums = [], []
     for met in range(max_orders):
         thinned = dr.opaque(mi.Bool, met + 1 >= halved_after)
         brought, path = _bounce(scene, origin, direction, rng, orders, weight, sun, thinned)
@@ -234,15 +285,14 @@ def _trace_block(
         bring, source, met_orders, whose = (
             np.array(dr.gather(type(x), x, bringing)) for x in (*brought, start)
         )
-        keys.append((whose.astype(np.int64) * 2 + source) << 32 | met_orders)
-        sums.append(bring.astype(np.float64))
+        yield whose, source, met_orders, bring
         if not len(goes_on):
-            break
+            return
         start, origin, direction, rng, orders, weight = (
             dr.gather(type(x), x, goes_on) for x in (start, origin, direction, rng, orders, weight)
         )
         dr.eval(start, origin, direction, rng, orders, weight)
-    return (np.concatenate(keys), np.concatenate(sums)), len(goes_on)
+    yield np.array(start), None, None, np.array(weight)
 
 
 def _first_rays(mi, views: Views, view, shifts, number, rng):

@@ -1,4 +1,4 @@
-"""What Mitsuba lacks: a leaf that reflects and transmits diffusely, and a medium of such leaves."""
+"""What Mitsuba lacks: leaves that reflect and transmit diffusely, and a medium of such leaves."""
 
 from functools import cache
 
@@ -9,13 +9,14 @@ from dapple.light.phase import NORM, reflected_quantile_table
 
 
 def register() -> None:
-    """Make the plugins `bilambertian` and `leaf_phase` known to the active variant, once each."""
+    """Make `bilambertian`, `painted` and `leaf_phase` known to the active variant, once each."""
     _register(mitsuba.variant())
 
 
 @cache
 def _register(variant: str) -> None:
     mitsuba.register_bsdf("bilambertian", _leaf_class(variant))
+    mitsuba.register_bsdf("painted", _painted_class(variant))
     mitsuba.register_phase("leaf_phase", _phase_class(variant))
 
 
@@ -25,6 +26,7 @@ def _split(reflectance, transmittance):
     return dr.select(scattered > 0.0, dr.mean(reflectance) / scattered, 0.5)
 
 
+@cache
 def _leaf_class(variant: str) -> type:
     mi = mitsuba
 
@@ -44,8 +46,12 @@ def _leaf_class(variant: str) -> type:
             ]
             self.m_flags = self.m_components[0] | self.m_components[1]
 
+        def optics(self, si, active):
+            """Reflectance, transmittance, and the chance that scattered light is reflected."""
+            return self.reflectance, self.transmittance, self.reflected_share
+
         def sample(self, ctx, si, sample1, sample2, active=True):
-            share = self.reflected_share
+            reflectance, transmittance, share = self.optics(si, active)
             lobe = mi.warp.square_to_cosine_hemisphere(sample2)
             lit_side = dr.mulsign(lobe, mi.Frame3f.cos_theta(si.wi))
             reflected = sample1 < share
@@ -60,7 +66,7 @@ def _leaf_class(variant: str) -> type:
                 mi.UInt32(+mi.BSDFFlags.DiffuseTransmission),
             )
             bs.sampled_component = dr.select(reflected, mi.UInt32(0), mi.UInt32(1))
-            weight = dr.select(reflected, self.reflectance, self.transmittance) / density
+            weight = dr.select(reflected, reflectance, transmittance) / density
             return bs, weight & (active & (bs.pdf > 0.0))
 
         def eval(self, ctx, si, wo, active=True):
@@ -70,17 +76,47 @@ def _leaf_class(variant: str) -> type:
             return self.eval_pdf(ctx, si, wo, active)[1]
 
         def eval_pdf(self, ctx, si, wo, active=True):
+            reflectance, transmittance, share = self.optics(si, active)
             towards, away = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
             lobe = dr.abs(away) * dr.inv_pi
             reflected = towards * away > 0.0
-            value = dr.select(reflected, self.reflectance, self.transmittance) * lobe
-            share = dr.select(reflected, self.reflected_share, 1.0 - self.reflected_share)
+            value = dr.select(reflected, reflectance, transmittance) * lobe
+            share = dr.select(reflected, share, 1.0 - share)
             return value & active, dr.select(active, share * lobe, 0.0)
 
         def to_string(self):
             return "BiLambertian[]"
 
     return BiLambertian
+
+
+def _painted_class(variant: str) -> type:
+    mi = mitsuba
+
+    class Painted(_leaf_class(variant)):
+        """Bi-Lambertian like `bilambertian`, but every triangle of a mesh has its own material."""
+
+        def __init__(self, props):
+            props["reflectance"] = props["transmittance"] = mi.ScalarColor3f(0.0)
+            super().__init__(props)
+
+        def assign(self, of_face):
+            """Give each triangle (t,) the number of its material."""
+            self.of_face = mi.UInt32(of_face)
+
+        def paint(self, reflectance, transmittance):
+            """Give each material (m, 3) its colours."""
+            self.colours = [mi.Float(x.ravel()) for x in (reflectance, transmittance)]
+
+        def optics(self, si, active):
+            material = dr.gather(mi.UInt32, self.of_face, si.prim_index, active)
+            both = [dr.gather(mi.Color3f, table, material, active) for table in self.colours]
+            return *both, _split(*both)
+
+        def to_string(self):
+            return "Painted[]"
+
+    return Painted
 
 
 def _phase_class(variant: str) -> type:

@@ -16,7 +16,7 @@ from dapple import engine
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
 from dapple.light.mitsuba_plugins import register
-from dapple.light.scene import MESH_KINDS, Optics, Scene, TurbidGrid, turbid_grid
+from dapple.light.scene import Optics, Scene, TurbidGrid, turbid_grid
 
 SPHERICAL_G = 0.5
 """Projection of a unit of leaf area with spherical angles, in any direction (Ross 1981)."""
@@ -207,6 +207,7 @@ def build(
         raise InputError(
             "bands", f"{len(optics)} bands", "1 to 3", "Gather them with scene.group_bands."
         )
+    scene.check_kinds()
     mi = engine.load(variant)
     register()
     colour = _colours(mi, optics)
@@ -255,26 +256,19 @@ def build(
 
 def mesh_shapes(mi: ModuleType, meshes: dict[str, Mesh], colour: dict[str, Any]) -> dict[str, Any]:
     """Mitsuba meshes by kind; `colour` holds the reflectances as Mitsuba dictionaries."""
-    if unknown := set(meshes) - set(MESH_KINDS):
-        raise InputError(
-            "Scene.meshes",
-            f"the kind {sorted(unknown)[0]}",
-            f"one of {', '.join(MESH_KINDS)}",
-            "Give each mesh an optical kind.",
-        )
+    lambertian = {"wood": "bark_reflectance", "ground": "ground_reflectance"}
     bsdf = {
         "leaf": {
             "type": "bilambertian",
             "reflectance": _plain(mi, colour["leaf_reflectance"]),
             "transmittance": _plain(mi, colour["leaf_transmittance"]),
         },
-        "wood": {
-            "type": "twosided",
-            "bsdf": {"type": "diffuse", "reflectance": colour["bark_reflectance"]},
-        },
+    } | {
+        kind: {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": colour[name]}}
+        for kind, name in lambertian.items()
     }
     return {
-        kind: _mesh(mi, kind, mesh, mi.load_dict(bsdf[kind]))
+        f"{kind}_mesh": _mesh(mi, kind, mesh, mi.load_dict(bsdf[kind]))
         for kind, mesh in meshes.items()
         if len(mesh.faces)
     }

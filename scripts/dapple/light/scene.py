@@ -1,4 +1,4 @@
-"""What light meets: meshes of leaves and wood, turbid voxels, the ground, and their optics."""
+"""What light meets: meshes of leaves, wood and terrain, turbid voxels, the ground, and optics."""
 
 from dataclasses import dataclass, field
 from itertools import combinations
@@ -9,7 +9,7 @@ import xarray as xr
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
 
-MESH_KINDS = ("leaf", "wood")
+MESH_KINDS = ("leaf", "wood", "ground")
 
 
 @dataclass(frozen=True)
@@ -19,11 +19,13 @@ class Scene:
     Attributes
     ----------
     meshes : dict of str to Mesh
-        By optical kind: `leaf` (bi-Lambertian) and `wood` (Lambertian, opaque).
+        By optical kind: `leaf` (bi-Lambertian), `wood` and `ground` (Lambertian, opaque). The
+        latter is terrain that is not flat.
     voxels : xarray.Dataset or None
         Turbid leaf medium: `plant_area_density_m2_m3` (x, y, z), attribute `voxel_size_m`.
     ground_z_m : float
-        Height of the flat Lambertian ground [m].
+        Height of the flat Lambertian ground around and below everything [m]; with terrain no higher
+        than its lowest point, since it has no hole where the terrain is.
     """
 
     meshes: dict[str, Mesh] = field(default_factory=dict)
@@ -39,6 +41,31 @@ class Scene:
             corners.append(np.array([grid.low_m, grid.low_m + size]))
         points = np.concatenate(corners)
         return np.array([points.min(axis=0), points.max(axis=0)])
+
+    def check_kinds(self) -> None:
+        """Make sure that engines know what they are given.
+
+        Raises
+        ------
+        InputError
+            An unknown kind of mesh, or terrain that dips below the flat ground.
+        """
+        if unknown := set(self.meshes) - set(MESH_KINDS):
+            raise InputError(
+                "Scene.meshes",
+                f"the kind {sorted(unknown)[0]}",
+                f"one of {', '.join(MESH_KINDS)}",
+                "Give each mesh an optical kind.",
+            )
+        terrain = self.meshes.get("ground")
+        lowest = np.inf if terrain is None else terrain.vertices_m[:, 2].min(initial=np.inf)
+        if lowest < self.ground_z_m:
+            raise InputError(
+                "Scene.ground_z_m",
+                f"{self.ground_z_m:.3f} m",
+                f"at most {lowest:.3f} m, where the terrain is lowest",
+                "Lower the flat ground: it would hide parts of the terrain.",
+            )
 
 
 @dataclass(frozen=True)

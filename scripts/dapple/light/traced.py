@@ -27,9 +27,9 @@ class TracedScene:
     variant : str
         Of Mitsuba.
     meshes : mitsuba.Scene or None
-        Leaf and wood as one mesh, which may stand in many places.
-    n_leaf : Dr.Jit UInt32
-        The mesh's first so many triangles are leaf, the others wood.
+        Leaf, wood and terrain as one mesh, which may stand in many places.
+    n_leaf, n_plant : Dr.Jit UInt32
+        The mesh's first so many triangles are leaf, or leaf and wood; the others are terrain.
     normals : Dr.Jit Float
         (3 * triangles,) unit normals; places are shifts and do not turn them.
     grid : TurbidVoxels or None
@@ -44,7 +44,7 @@ class TracedScene:
     def __init__(self, variant: str, meshes, grid, box_m, ground_z_m: float, cell_m):
         self.variant, self.grid = variant, grid
         mi = self.mi
-        self.meshes, self.n_leaf, self.normals = meshes or (None, None, None)
+        self.meshes, self.n_leaf, self.n_plant, self.normals = meshes or (None, None, None, None)
         extent = max(LEAST_EXTENT_M, float(np.abs(box_m).max()))
         # Opaque numbers stay out of the kernel's code: one kernel serves all scenes.
         self.ground_z, self.top_z, self.ray_offset = (
@@ -103,16 +103,18 @@ class TracedScene:
         crossed = met & ~voxel & ~mesh & ~ground
 
         normal = mi.Normal3f(0, 0, 1)
-        leaf = mi.Bool(voxel)
+        leaf, bark = mi.Bool(voxel), mi.Bool(False)
         if dr.hint(self.meshes is not None, mode="scalar"):
             leaf |= mesh & (found.prim_index < self.n_leaf)
+            ground |= mesh & (found.prim_index >= self.n_plant)
+            bark = mesh & ~leaf & ~ground
             normal[mesh] = dr.gather(mi.Normal3f, self.normals, found.prim_index, mesh)
         if dr.hint(self.grid is not None, mode="scalar"):
             drawn = self.grid.leaf_normal(direction, rng, voxel)
             normal[voxel] = drawn
         normal = dr.select(dr.dot(normal, direction) > 0, -normal, normal)
         point = self._wrapped(origin + direction * distance, direction, crossed)
-        return point, normal, leaf, voxel, mesh & ~leaf, ground, crossed
+        return point, normal, leaf, voxel, bark, ground, crossed
 
     @dr.syntax
     def meet(self, origin, direction, rng, active):
@@ -215,15 +217,10 @@ def load(
     Raises
     ------
     InputError
-        An unknown kind of mesh, wrong voxels, or voxels wider than the cell.
+        An unknown kind of mesh, terrain below the flat ground, wrong voxels, or voxels wider than
+        the cell.
     """
-    if unknown := set(scene.meshes) - set(MESH_KINDS):
-        raise InputError(
-            "Scene.meshes",
-            f"the kind {sorted(unknown)[0]}",
-            f"one of {', '.join(MESH_KINDS)}",
-            "Give each mesh an optical kind.",
-        )
+    scene.check_kinds()
     mi = engine.load(variant)
     grid = turbid.load(mi, scene.voxels)
     cell = None if cell_m is None else np.asarray(cell_m, np.float64)
@@ -245,8 +242,11 @@ def load(
             box = box + np.array([places.min(axis=0), places.max(axis=0)])
         boxes.append(box)
         loaded = mi.load_dict({"type": "scene", **content}, optimize=False)
-        n_leaf = len(scene.meshes["leaf"].faces) if "leaf" in scene.meshes else 0
-        meshes = loaded, dr.opaque(mi.UInt32, n_leaf), normals
+        counts = [
+            len(scene.meshes[kind].faces) if kind in scene.meshes else 0 for kind in MESH_KINDS
+        ]
+        ends = (dr.opaque(mi.UInt32, n) for n in (counts[0], counts[0] + counts[1]))
+        meshes = loaded, *ends, normals
     boxes.append(np.full((2, 3), scene.ground_z_m))
     box = np.array([np.min(boxes, axis=(0, 1)), np.max(boxes, axis=(0, 1))])
     return TracedScene(variant, meshes, grid, box, scene.ground_z_m, cell)

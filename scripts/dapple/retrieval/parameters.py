@@ -1,0 +1,99 @@
+"""Which leaves and soils to simulate: a jittered grid over the ranges of their parameters."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from dapple.errors import InputError
+
+
+@dataclass(frozen=True)
+class Range:
+    """A parameter that varies: its bounds and the number of grid levels between them."""
+
+    low: float
+    high: float
+    levels: int
+
+    @property
+    def step(self) -> float:
+        """Distance between two levels."""
+        return (self.high - self.low) / max(self.levels - 1, 1)
+
+
+# Ranges: Zhao et al. (2025). Names: those of PROSPECT's arguments in optics/leaf.py.
+TABLE: dict[str, Range] = {
+    "n": Range(1.0, 2.5, 4),
+    "chlorophyll_ug_cm2": Range(10.0, 70.0, 13),
+    "dry_matter_g_cm2": Range(0.0, 0.03, 4),
+    "brown": Range(0.0, 0.8, 5),
+    "soil_brightness": Range(0.01, 0.7, 4),
+    "soil_moisture": Range(0.01, 0.78, 4),
+}
+CHLOROPHYLL_PER_CAROTENOID = 4.0
+WATER_CM = 0.015
+
+
+def draw(
+    n_combinations: int,
+    *,
+    seed: int,
+    table: Mapping[str, Range] = TABLE,
+    jitter_steps: float = 0.5,
+    chlorophyll_per_carotenoid: float = CHLOROPHYLL_PER_CAROTENOID,
+    water_cm: float = WATER_CM,
+) -> pd.DataFrame:
+    """Draw combinations of leaf and soil parameters.
+
+    Parameters
+    ----------
+    n_combinations : int
+        How many.
+    seed : int
+        Of the random order and jitter.
+    table : mapping of str to Range
+        The parameters that vary.
+    jitter_steps : float
+        Standard deviation of the Gaussian jitter, in grid steps.
+    chlorophyll_per_carotenoid : float
+        Carotenoids follow from chlorophyll.
+    water_cm : float
+        Equivalent water thickness, which the camera hardly sees [cm].
+
+    Returns
+    -------
+    DataFrame
+        One row per combination: the columns of `table`, `carotenoids_ug_cm2`, `water_cm`.
+
+    Raises
+    ------
+    InputError
+        No combination, or bounds in the wrong order.
+
+    Notes
+    -----
+    The full grid has thousands of nodes, so that a part of it is drawn: every parameter takes
+    each of its levels equally often, in an order of its own (a Latin hypercube of grid levels).
+    Jitter that leaves the bounds is cut off at them (Zhao et al. 2025).
+    """
+    if n_combinations < 1:
+        raise InputError("combinations", f"{n_combinations}", "1 or more", "Ask for more.")
+    rng = np.random.default_rng(seed)
+    columns = {}
+    for name, bounds in table.items():
+        if not bounds.low <= bounds.high or bounds.levels < 1:
+            raise InputError(
+                f"range of {name}", f"{bounds.low} to {bounds.high} in {bounds.levels} levels",
+                "low <= high and at least one level", "Correct the range.",
+            )  # fmt: skip
+        levels = np.linspace(bounds.low, bounds.high, bounds.levels)
+        # Which levels come once more often than others, where they do not divide n, is chance.
+        node = rng.permutation(np.resize(rng.permutation(levels), n_combinations))
+        jitter = rng.normal(0.0, jitter_steps * bounds.step, n_combinations)
+        columns[name] = np.clip(node + jitter, bounds.low, bounds.high)
+    frame = pd.DataFrame(columns)
+    frame["carotenoids_ug_cm2"] = frame["chlorophyll_ug_cm2"] / chlorophyll_per_carotenoid
+    frame["water_cm"] = water_cm
+    return frame

@@ -1,0 +1,61 @@
+"""Trace the light of every pixel of a plot's images once, for any leaf and soil."""
+
+import resource
+import time
+
+from dapple.formats import coefficients as files
+from dapple.formats import json, rasters, scenes
+from dapple.frames import direction_from_angles
+from dapple.light import traced
+from dapple.retrieval import image_paths, maps
+from dapple.retrieval.coefficients import Window, projection_error, remainder_bound
+from dapple.workflow import options, run
+
+BRIGHT = ([[0.47]], [[0.47]], [[0.3]], [[0.4]])
+"""Leaf reflectance and transmittance, bark and soil for which errors are told in the facts."""
+
+
+def main(snakemake):
+    params, inputs = options(snakemake.params), snakemake.input
+    observed = rasters.read(inputs.images)
+    origin_m = json.read(inputs.summary)["world_origin_m"]
+    rows, columns = maps.shape_of(observed, params["pixel_m"])
+    window = Window(
+        observed.left_m - origin_m[0],
+        observed.top_m - origin_m[1],
+        params["pixel_m"],
+        rows,
+        columns,
+    )
+    n_paths = max(params["paths_per_pixel"], -(-params["least_paths"] // window.n_pixels))
+    started = time.perf_counter()
+    coefficients = image_paths.trace(
+        traced.load(scenes.read_plot(inputs.leaves, inputs.terrain), params["variant"]),
+        window,
+        direction_from_angles(params["sun"]["zenith_deg"], params["sun"]["azimuth_deg"]),
+        n_paths=n_paths,
+        n_columns=params["columns"],
+        max_orders=params["max_orders"],
+        cell_m=params["cell_m"],
+        seed=params["seed"],
+    )
+    seconds = time.perf_counter() - started
+    files.write(snakemake.output.coefficients, coefficients)
+    facts = {
+        "rows": rows,
+        "columns": columns,
+        "paths_per_pixel": coefficients.n_paths,
+        "kinds_of_paths": len(coefficients.orders),
+        "longest_path": int(coefficients.orders.sum(axis=1, dtype=int).max()),
+        "projection_error_bright": projection_error(coefficients, *BRIGHT, 0.1).item(),
+        "remainder_bound_bright": remainder_bound(coefficients, *BRIGHT).item(),
+        "seconds": seconds,
+        "paths_per_s": window.n_pixels * coefficients.n_paths / seconds,
+        "peak_rss_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    }
+    json.write(snakemake.output.facts, facts)
+    print(facts)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

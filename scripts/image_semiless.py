@@ -1,0 +1,35 @@
+"""Fit the terms of Semi-LESS to images of reference leaves and soils."""
+
+import resource
+import time
+
+from dapple.formats import coefficients as files
+from dapple.formats import json
+from dapple.retrieval import semiless
+from dapple.workflow import options, run
+
+
+def main(snakemake):
+    params = options(snakemake.params)
+    coefficients = files.read(snakemake.input.coefficients)
+    started = time.perf_counter()
+    fitted = semiless.fit(
+        coefficients,
+        params["diffuse_share"],
+        n_levels=params["levels"],
+        structure=params["structure"],
+        degree=params["degree"],
+        bark=params["bark"],
+        soils=(0.0, *params["soils"]),
+    )
+    facts = {
+        "seconds": time.perf_counter() - started,
+        "peak_rss_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    }
+    files.write_semiless(snakemake.output.semiless, fitted)
+    json.write(snakemake.output.facts, facts)
+    print(facts)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

@@ -1,0 +1,26 @@
+"""Put the comparisons of all plots together."""
+
+import pandas as pd
+
+from dapple.formats.atomic import atomic
+from dapple.workflow import run
+
+
+def main(snakemake):
+    params = snakemake.params
+    for paths, output in (
+        (snakemake.input.speed, snakemake.output.speed),
+        (snakemake.input.comparison, snakemake.output.comparison),
+    ):
+        parts = [
+            pd.read_csv(path).assign(plot=plot)
+            for plot, path in zip(params.plots, paths, strict=True)
+        ]
+        table = pd.concat(parts)
+        with atomic(output) as partial:
+            table[["plot", *table.columns[:-1]]].to_csv(partial, index=False)
+        print(table.to_string())
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

@@ -1,0 +1,78 @@
+"""Average canopy pixels of the observed images over the cells of the map."""
+
+import numpy as np
+import pandas as pd
+
+from dapple.formats import rasters
+from dapple.formats.atomic import atomic
+from dapple.retrieval import maps, training
+from dapple.workflow import run
+
+
+def main(snakemake):
+    params, path = snakemake.params, snakemake.input.images
+    observed = rasters.select(rasters.read(path), training.BANDS, path)
+    rasters.require_reflectance(observed, path)
+    heights = rasters.read(snakemake.input.heights)
+    rasters.require_overlap(
+        heights,
+        (observed.left_m, observed.bottom_m),
+        (observed.right_m, observed.top_m),
+        observed.crs,
+        where=snakemake.input.heights,
+        other=path,
+    )
+    grid = {
+        "left_m": observed.left_m,
+        "top_m": observed.top_m,
+        "pixel_m": params.pixel_m,
+        "shape": maps.shape_of(observed, params.pixel_m),
+    }
+    image = maps.resample(observed, **grid)
+    height_m = maps.sample(heights, **grid)[0]
+    canopy = maps.canopy(
+        height_m, min_height_m=params.canopy_height_m, where=snakemake.input.heights
+    )
+    over = training.cells(canopy.shape, pixel_m=params.pixel_m, cell_m=params.cell_m)
+    found = training.aggregate(
+        training.chunks_of(image), canopy, over,
+        sunlit_nir=params.sunlit_nir, min_share=params.min_share,
+    )  # fmt: skip
+    corner = (observed.left_m, observed.top_m)
+    for mask, (means, count) in found.items():
+        layers = np.concatenate([means[0], count.astype(np.float32)])
+        bands = (*training.BANDS, "pixels")
+        raster = rasters.Raster(layers, *corner, params.cell_m, observed.crs, bands)
+        rasters.write(snakemake.output[mask], raster)
+        print(f"{mask}: {np.isfinite(means[0, 0]).sum()} of {means[0, 0].size} cells with data")
+    mask = rasters.Raster(
+        canopy[None].astype(np.float32), *corner, params.pixel_m, observed.crs, ("canopy",)
+    )
+    rasters.write(snakemake.output.canopy, mask)
+    with atomic(snakemake.output.pixels) as partial:
+        pixel_spectra(image, canopy, params.sunlit_nir).to_csv(
+            partial, index=False, float_format="%.6g"
+        )
+
+
+def pixel_spectra(image, canopy, sunlit_nir):
+    """Mean and deviation of each band over sunlit, shaded and all canopy pixels."""
+    known = training.select(image, canopy, mask="all")
+    sunlit = training.select(image, canopy, mask="sunlit", sunlit_nir=sunlit_nir)
+    kinds = {"sunlit": sunlit, "shaded": known & ~sunlit, "all": known}
+    rows = [
+        {
+            "kind": kind,
+            "wavelength_nm": int(name),
+            "n": int(chosen.sum()),
+            "mean": float(band[chosen].mean()) if chosen.any() else np.nan,
+            "deviation": float(band[chosen].std()) if chosen.any() else np.nan,
+        }
+        for kind, chosen in kinds.items()
+        for name, band in zip(training.BANDS, image, strict=True)
+    ]
+    return pd.DataFrame(rows)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

@@ -1,0 +1,45 @@
+"""Run all methods under every level of one stressor in one world."""
+
+import pandas as pd
+
+from dapple import engine
+from dapple.formats import clouds, json, meshes, shots
+from dapple.formats.atomic import atomic
+from dapple.stability import outcome, stressors
+from dapple.stability.run import Chain
+from dapple.stability.stressors import UNDISTURBED
+from dapple.stability.world import Setup
+from dapple.workflow import run
+
+
+def main(snakemake):
+    params, inputs = snakemake.params, snakemake.input
+    engine.use_threads(snakemake.threads)
+    world = int(snakemake.wildcards.world)
+    stressor = stressors.find(snakemake.wildcards.stressor)
+    chain = Chain(Setup(**params.setup), params.seed)
+    seconds = json.read(inputs.seconds)
+    ready = {
+        "tree": {"leaf": meshes.read_ply(inputs.leaves), "wood": meshes.read_ply(inputs.wood)},
+        "shots": shots.read(inputs.shots),
+        "clean": clouds.read(inputs.cloud),
+    }
+    for step, value in ready.items():
+        chain.give(step, UNDISTURBED, value, seconds[step])
+    tables = []
+    for level in stressor.chosen(params.levels):
+        if level.changes:
+            rows = outcome.rows(chain, stressor, level, world, params.methods)
+            tables.append(outcome.table(rows))
+        else:
+            undisturbed = pd.read_csv(inputs.undisturbed, keep_default_na=True)
+            tables.append(
+                undisturbed.assign(stressor=stressor.name, level=level.value, label=level.label)
+            )
+        print(f"{stressor.name} {level.label}", flush=True)
+    with atomic(snakemake.output.batch) as partial:
+        pd.concat(tables, ignore_index=True).to_csv(partial, index=False, float_format="%.6g")
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

@@ -1,0 +1,17 @@
+"""The map of where methods fail, and its curves."""
+
+import pandas as pd
+
+from dapple.figures import style
+from dapple.stability import figures
+from dapple.workflow import run
+
+
+def main(snakemake):
+    points = pd.read_csv(snakemake.input.points, dtype={"label": str})
+    style.save(figures.heat_map(points), snakemake.output.map)
+    style.save(figures.curves(points), snakemake.output.curves)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

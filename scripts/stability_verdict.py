@@ -1,0 +1,25 @@
+"""Fit the verdict to all stress runs, and tell how it does on runs that it was not fitted to."""
+
+import pandas as pd
+
+from dapple.formats.atomic import atomic
+from dapple.stability import verdict
+from dapple.workflow import run
+
+
+def main(snakemake):
+    points = pd.read_csv(snakemake.input.points, dtype={"label": str, "failed": str})
+    found = verdict.store(snakemake.output.model, points)
+    rows = []
+    for kind, facts in found.items():
+        for check, rates in facts["rates"].items():
+            parts = rates if check.startswith("by_") else {"all": rates}
+            rows += [{"signals": kind, "check": check, "of": of} | one for of, one in parts.items()]
+    table = pd.DataFrame(rows)
+    print(table[table["of"] == "all"].to_string())
+    with atomic(snakemake.output.rates) as partial:
+        table.to_csv(partial, index=False, float_format="%.4g")
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

@@ -1,0 +1,110 @@
+"""Simulate images of many leaves and soils and average their canopy pixels over cells."""
+
+import time
+
+import numpy as np
+import pandas as pd
+
+from dapple.errors import InputError
+from dapple.formats import coefficients as coefficient_files
+from dapple.formats import json, meshes, rasters
+from dapple.formats.atomic import atomic
+from dapple.optics import soil
+from dapple.retrieval import coefficients, parameters, prosail, semiless, spectra, training
+from dapple.workflow import options, run
+
+
+def main(snakemake):
+    params, start = options(snakemake.params), time.perf_counter()
+    canopy = rasters.read(snakemake.input.canopy)
+    leaves, properties = leaves_and_soils(params["leaves_and_soils"], params["seed"])
+    origin_m = json.read(snakemake.input.summary)["world_origin_m"]
+    if params["model"] == "prosail":
+        chunks, mask, pixel_m = level_canopies(
+            snakemake.input.simulation, canopy, properties, origin_m, params
+        )
+    else:
+        chunks, window = images(snakemake.input.simulation, properties, params)
+        check_window(window, canopy, origin_m, snakemake.input.simulation)
+        mask, pixel_m = canopy.values[0] > 0, canopy.pixel_m
+    selection = params["selection"]
+    over = training.cells(mask.shape, pixel_m=pixel_m, cell_m=selection["cell_m"])
+    found = training.aggregate(
+        chunks, mask, over,
+        sunlit_nir=selection["sunlit_nir"], min_share=selection["min_share"],
+    )  # fmt: skip
+    for name, (means, count) in found.items():
+        path = snakemake.output[name]
+        frame = training.entries(
+            means, count, leaves,
+            max_entries=params["max_entries"], seed=params["seed"], where=path,
+        )  # fmt: skip
+        n_made = int(np.isfinite(means[:, 0]).sum())
+        print(f"{name}: {n_made} entries of {len(leaves)} combinations, {len(frame)} kept")
+        with atomic(path) as partial:
+            frame.to_parquet(partial, index=False)
+    print(f"{time.perf_counter() - start:.1f} s")
+
+
+def leaves_and_soils(settings, seed) -> tuple[pd.DataFrame, spectra.Spectra]:
+    """Combinations of leaf and soil, and their spectra."""
+    drawn = parameters.draw(
+        settings["combinations"],
+        seed=seed,
+        table={name: parameters.Range(*row) for name, row in settings["ranges"].items()},
+        jitter_steps=settings["jitter_steps"],
+        chlorophyll_per_carotenoid=settings["chlorophyll_per_carotenoid"],
+        water_cm=settings["water_cm"],
+    )
+    model = soil.choose(settings["soil_vectors"])
+    return drawn, spectra.spectra(drawn, model, prospect_version=settings["prospect_version"])
+
+
+def images(path, properties, params):
+    """Chunks of pixels of images by three-dimensional transport, and their grid."""
+    light = params["light"]
+    leaf = (properties.leaf_reflectance, properties.leaf_transmittance)
+    share = np.asarray(light["diffuse_share"])
+    if params["model"] == "semi_less":
+        fitted = coefficient_files.read_semiless(path)
+        return semiless.image_chunks(fitted, *leaf, properties.soil_reflectance), fitted.window
+    traced = coefficient_files.read(path)
+    bark = np.atleast_2d(light["bark"])
+    chunks = coefficients.image_chunks(traced, *leaf, bark, properties.soil_reflectance, share)
+    return chunks, traced.window
+
+
+def level_canopies(path, canopy, properties, origin_m, params):
+    """SAIL of every cell with plants and canopy pixels, as pixels as large as cells."""
+    cell_m = params["selection"]["cell_m"]
+    over = training.cells(canopy.values.shape[1:], pixel_m=canopy.pixel_m, cell_m=cell_m)
+    index = prosail.plant_area_index(
+        meshes.read_ply(path), left_m=canopy.left_m - origin_m[0], top_m=canopy.top_m - origin_m[1],
+        cell_m=cell_m, shape=over.shape,
+    )  # fmt: skip
+    number = np.bincount(over.of_pixel, canopy.values[0].ravel() > 0, index.size)
+    enough = number >= params["selection"]["min_share"] * over.pixels_per_cell
+    mask = enough.reshape(index.shape) & (index > 0)
+    print(f"plant area index of {mask.sum()} cells: mean {index[mask].mean():.2f}")
+    light = params["light"]
+    values = prosail.images(
+        index, properties, sun_zenith_deg=light["sun_zenith_deg"],
+        diffuse_share=np.asarray(light["diffuse_share"]), **params["sail"],
+    )  # fmt: skip
+    return [(slice(0, len(values)), values)], mask, cell_m
+
+
+def check_window(window, canopy, origin_m, path):
+    """Simulated and observed images lie on one grid."""
+    found = (window.left_m + origin_m[0], window.top_m + origin_m[1], window.pixel_m)
+    wanted = (canopy.left_m, canopy.top_m, canopy.pixel_m)
+    shape = (window.rows, window.columns)
+    if not np.allclose(found, wanted, rtol=0, atol=1e-3) or shape != canopy.values.shape[1:]:
+        raise InputError(
+            path, f"images from {found} of {shape} pixels",
+            f"{wanted} of {canopy.values.shape[1:]}", "Make the simulated images again.",
+        )  # fmt: skip
+
+
+if __name__ == "__main__":
+    run(main, snakemake)
