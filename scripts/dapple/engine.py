@@ -63,6 +63,16 @@ def load(variant: str = "llvm_ad_rgb") -> ModuleType:
     return mitsuba
 
 
+def use_threads(n: int) -> None:
+    """Let Dr.Jit and numba use so many threads: jobs that run side by side share the cores."""
+    import drjit
+    import numba
+
+    load()
+    drjit.set_thread_count(n)
+    numba.set_num_threads(min(n, numba.config.NUMBA_NUM_THREADS))
+
+
 def _probe(variant: str) -> None:
     """Compile and run the smallest kernel, so that a broken back end shows here and not later."""
     import drjit

@@ -1,0 +1,74 @@
+import numpy as np
+import pytest
+
+from dapple.errors import InputError
+from dapple.optics import soil
+from dapple.optics.bands import camera_windows, window_mean
+from dapple.optics.leaf import camera_leaves, leaf_spectra
+
+
+@pytest.fixture
+def vectors(tmp_path):
+    """A flat dry soil of 0.5, and water that takes more in the infrared."""
+    dry = np.array([np.full(211, 0.5), np.linspace(0, 1, 211), np.zeros(211)])
+    np.savetxt(tmp_path / "DryVec.txt", dry)
+    np.savetxt(tmp_path / "SMVec.txt", np.linspace(0.1, 1.0, 211)[None])
+    return tmp_path
+
+
+def test_a_window_of_a_straight_line_has_the_value_in_its_middle():
+    table_nm = np.arange(400.0, 2501.0, 10.0)
+    low, high = camera_windows()
+    assert high - low == pytest.approx([32, 32, 32, 32, 52])
+    mean = window_mean(table_nm, 0.001 * table_nm, low, high)
+    assert mean == pytest.approx([0.45, 0.56, 0.65, 0.73, 0.84], rel=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["gsv", "two soils"])
+def test_a_brighter_soil_is_brighter_and_a_wetter_soil_darker_in_proportion(vectors, kind):
+    model = soil.choose(vectors if kind == "gsv" else "")
+    dark, bright, wet = model(np.array([0.2, 0.4, 0.4]), np.array([0.1, 0.1, 0.7]))
+    assert bright == pytest.approx(2 * dark)
+    assert (wet < bright).all()
+    assert (wet > 0).all()
+
+
+def test_a_dry_gsv_soil_is_its_first_vector_times_brightness(vectors):
+    model = soil.gsv(*soil.read_gsv(vectors))
+    assert model(0.3, 0.0)[0] == pytest.approx(np.full(5, 0.15))
+    # Water at 450 nm: 0.1 + 0.9 × 50 / 2100
+    assert model(0.3, 0.5)[0, 0] == pytest.approx(0.3 * (0.5 - 0.5 * (0.1 + 0.9 * 50 / 2100)))
+
+
+def test_a_soil_never_leaves_0_to_1(vectors):
+    model = soil.gsv(*soil.read_gsv(vectors))
+    assert (model(10.0, 0.0) == 1.0).all()
+    assert (model(1.0, 50.0) == 0.0).all()
+
+
+def test_soil_vectors_that_are_missing_or_of_another_length_are_refused(tmp_path):
+    with pytest.raises(InputError, match="no file"):
+        soil.choose(tmp_path)
+    np.savetxt(tmp_path / "DryVec.txt", np.zeros((3, 210)))
+    with pytest.raises(InputError, match=r"\(3, 210\); expected \(3, 211\)"):
+        soil.choose(tmp_path)
+
+
+def test_leaves_in_a_camera_are_leaves_in_narrow_bands_averaged():
+    reflectance, transmittance = camera_leaves(n=[1.2, 2.4], chlorophyll_ug_cm2=[20.0, 60.0])
+    assert reflectance.shape == transmittance.shape == (2, 5)
+    narrow, _ = leaf_spectra(np.arange(424.0, 477.0), n=2.4, chlorophyll_ug_cm2=60.0)
+    assert reflectance[1, 0] == pytest.approx(narrow[10:43].mean(), rel=2e-3)
+
+
+def test_leaves_are_bright_and_hardly_absorb_in_the_near_infrared():
+    reflectance, transmittance = camera_leaves(chlorophyll_ug_cm2=[10.0, 70.0])
+    assert (reflectance + transmittance)[:, 4] == pytest.approx(0.95, abs=0.04)
+    # Chlorophyll tells in green and red edge, and not at all at 840 nm.
+    assert (reflectance[0] > 1.2 * reflectance[1])[[1, 3]].all()
+    assert reflectance[0, 4] == pytest.approx(reflectance[1, 4], rel=1e-3)
+
+
+def test_leaves_beyond_the_range_of_prospect_are_refused():
+    with pytest.raises(InputError, match="brown"):
+        camera_leaves(brown=[0.1, 9.0])
