@@ -17,6 +17,7 @@ wildcard_constraints:
     plot="larch|spruce|user",
     model="collision_orders|semi_less|prosail",
     mask="sunlit|all",
+    network="robust|published",
 
 
 def plot_of(wildcards):
@@ -150,38 +151,67 @@ NETWORK = {
     )
 }
 SPLIT = {"test_share": RETRIEVAL.test_share, "held_share": RETRIEVAL.held_share}
-TAUGHT = list(product(RETRIEVAL.models, RETRIEVAL.masks))
+ERRORS = {
+    "relative": RETRIEVAL.relative_noise,
+    "relative_common": RETRIEVAL.relative_noise,
+    "absolute": RETRIEVAL.absolute_noise,
+    "absolute_common": RETRIEVAL.absolute_noise,
+}
+TAUGHT = [
+    {"model": model, "mask": mask, "network": network}
+    for model, mask, network in product(
+        RETRIEVAL.models, RETRIEVAL.masks, RETRIEVAL.networks
+    )
+]
 
 
-def retrieval_files(name, plots=CHLOROPHYLL.plots):
-    """A file of every plot, model and mask."""
+def retrieval_files(name, plots=CHLOROPHYLL.plots, **only):
+    """A file of every plot, model, mask and network, or only of some."""
     return [
-        results(f"plots/{plot}/retrieval/{name.format(model=model, mask=mask)}")
+        results(f"plots/{plot}/retrieval/{name.format(**taught)}")
         for plot in plots
-        for model, mask in TAUGHT
+        for taught in TAUGHT
+        if only.items() <= taught.items()
     ]
 
 
 def of_plot(name):
-    """A file of every model and mask of the plot of a job."""
+    """A file of every model, mask and network of the plot of a job."""
     return lambda wildcards: retrieval_files(name, [wildcards.plot])
 
 
-def networks_of(wildcards):
-    """Networks of all seeds that learned from one training set."""
-    name = f"retrieval/network_{wildcards.model}_{wildcards.mask}"
-    path = plot_file(name).format(plot=wildcards.plot)
-    return [f"{path}_{seed}.npz" for seed in RETRIEVAL.seeds]
+def of_model(name):
+    """A file of every mask and network of the plot and model of a job."""
+    return lambda wildcards: retrieval_files(
+        name, [wildcards.plot], model=wildcards.model
+    )
 
 
-def histories_of(wildcards):
-    """Loss curves of all networks of a plot."""
+def taught_by(model):
+    """Masks and networks of a model, in the order of its files."""
+    return [taught for taught in TAUGHT if taught["model"] == model]
+
+
+def made_of_model(name):
+    """Patterns of the files of every mask and network of a model."""
     return [
-        path
-        for seed in RETRIEVAL.seeds
-        for path in retrieval_files(
-            f"history_{{model}}_{{mask}}_{seed}.csv", [wildcards.plot]
+        plot_file(f"retrieval/{name.format(**taught)}")
+        for taught in (
+            {"model": "{model}", "mask": mask, "network": network}
+            for mask, network in product(RETRIEVAL.masks, RETRIEVAL.networks)
         )
+    ]
+
+
+def networks_of_model(wildcards):
+    """Networks of a model: those of all seeds of a mask and kind together."""
+    return [
+        results(
+            f"plots/{wildcards.plot}/retrieval/"
+            f"network_{taught['model']}_{taught['mask']}_{taught['network']}_{seed}.npz"
+        )
+        for taught in taught_by(wildcards.model)
+        for seed in RETRIEVAL.seeds
     ]
 
 

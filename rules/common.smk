@@ -169,6 +169,7 @@ SURVEY_FILES = (
 
 CHLOROPHYLL_FILES = (
     "chlorophyll/accuracy.csv",
+    "chlorophyll/speed.csv",
     "chlorophyll/map.tif",
     *(
         f"chlorophyll/{plot}_{figure}.png"
@@ -182,6 +183,7 @@ STABILITY_FILES = (
     "stability/published.csv",
     "stability/map.png",
     "stability/curves.png",
+    "stability/verdict.csv",
 )
 
 

@@ -6,6 +6,7 @@ Makes   plots/{plot}/scene/dem.tif         elevation of the ground
         plots/{plot}/scene/chm.tif         height of the canopy
         plots/{plot}/scene/ground.laz      points of the ground
         plots/{plot}/scene/crowns.tif      crowns and sub-crowns by number
+        plots/{plot}/scene/summary.json    totals, and how pulses and their light were found
         plots/{plot}/scene/subcrowns.csv   volume and plant area of every sub-crown and layer
         plots/{plot}/scene/leaves.ply      square facets
         plots/{plot}/scene/terrain.ply     the ground as triangles
@@ -86,6 +87,7 @@ rule plot_scene:
     input:
         lidar=plot_lidar,
         dem=plot_file("scene/dem.tif"),
+        chm=plot_file("scene/chm.tif"),
         crowns=plot_file("scene/crowns.tif"),
         code=code("plot_scene"),
     output:
@@ -93,6 +95,7 @@ rule plot_scene:
         leaves=plot_file("scene/leaves.ply"),
         terrain=plot_file("scene/terrain.ply"),
         summary=plot_file("scene/summary.json"),
+        picture=plot_file("scene/crowns.png"),
     log:
         logs("plot_scene_{plot}"),
     benchmark:
@@ -104,22 +107,22 @@ rule plot_scene:
         mem_mb=6000,
     params:
         noise=CROWN_NOISE,
-        division={
-            "n_layers": CROWNS.layers,
-            "base_share": CROWNS.base_share,
-            "min_height_m": CROWNS.min_leaf_height_m,
-        },
+        n_layers=CROWNS.layers,
+        base_share=CROWNS.base_share,
+        min_height_m=CROWNS.min_leaf_height_m,
         voxel_m=CROWNS.voxel_m,
         alpha_m=CROWNS.alpha_m,
         alpha_spacings=CROWNS.alpha_spacings,
-        window_s=CROWNS.window_s,
-        range_exponent=CROWNS.range_exponent,
-        ground_to_canopy_intensity=CROWNS.ground_to_canopy_intensity,
-        projection=CROWNS.projection,
-        max_density_m2_m3=CROWNS.max_density_m2_m3,
         clumping_index=CROWNS.clumping_index,
         facet_area_m2=CROWNS.facet_area_m2,
         terrain_step_m=CROWNS.terrain_step_m,
+        pulse_options={
+            "window_s": CROWNS.window_s,
+            "range_exponent": CROWNS.range_exponent,
+            "ground_to_canopy_intensity": CROWNS.ground_to_canopy_intensity,
+            "projection": CROWNS.projection,
+            "max_density_m2_m3": CROWNS.max_density_m2_m3,
+        },
         seed=lambda wildcards: stream("facets", wildcards.plot),
     message:
         "{settings.experiment}: fill the crowns of {wildcards.plot} with facets"

@@ -8,9 +8,9 @@ Makes   plots/{plot}/retrieval/canopy.tif                  pixels that see the c
         plots/{plot}/retrieval/observed_{mask}.tif         means of observed pixels by cell
         plots/{plot}/retrieval/pixels.csv                  spectra of sunlit and shaded pixels
         plots/{plot}/retrieval/training_{model}_{mask}.parquet
-        plots/{plot}/retrieval/network_{model}_{mask}_{seed}.npz, history_....csv
-        plots/{plot}/retrieval/map_{model}_{mask}.tif      chlorophyll with its interval
-        plots/{plot}/retrieval/accuracy_{model}_{mask}.csv, trees_{model}_{mask}.csv
+        plots/{plot}/retrieval/network_{model}_{mask}_{network}_{seed}.npz, history_....csv
+        plots/{plot}/retrieval/map_{model}_{mask}_{network}.tif   chlorophyll with its interval
+        plots/{plot}/retrieval/accuracy_{model}.csv, trees_{model}.csv
         chlorophyll/accuracy.csv, chlorophyll/map.tif      of all; map of the first plot
         chlorophyll/{plot}_*.png                           figures
 """
@@ -84,44 +84,15 @@ rule network:
         training=plot_file("retrieval/training_{model}_{mask}.parquet"),
         code=code("network"),
     output:
-        network=plot_file("retrieval/network_{model}_{mask}_{seed}.npz"),
-        history=plot_file("retrieval/history_{model}_{mask}_{seed}.csv"),
+        networks=[
+            plot_file(f"retrieval/network_{{model}}_{{mask}}_{{network}}_{seed}.npz")
+            for seed in RETRIEVAL.seeds
+        ],
+        history=plot_file("retrieval/history_{model}_{mask}_{network}.csv"),
     log:
-        logs("network_{plot}_{model}_{mask}_{seed}"),
+        logs("network_{plot}_{model}_{mask}_{network}"),
     benchmark:
-        benchmarks("network_{plot}_{model}_{mask}_{seed}")
-    wildcard_constraints:
-        seed="[0-9]+",
-    conda:
-        "../envs/dapple.yaml"
-    threads: 1
-    resources:
-        mem_mb=2000,
-    params:
-        seed="{seed}",
-        split=SPLIT,
-        split_seed=split_seed,
-        network=NETWORK,
-        range_ug_cm2=RETRIEVAL.chlorophyll_ug_cm2[:2],
-    message:
-        "{settings.experiment}: network {wildcards.seed} of {wildcards.plot}, {wildcards.model}, {wildcards.mask} pixels"
-    script:
-        "../scripts/network.py"
-
-
-rule lcc_map:
-    input:
-        training=plot_file("retrieval/training_{model}_{mask}.parquet"),
-        networks=networks_of,
-        observed=plot_file("retrieval/observed_{mask}.tif"),
-        code=code("lcc_map"),
-    output:
-        map=plot_file("retrieval/map_{model}_{mask}.tif"),
-        interval=plot_file("retrieval/interval_{model}_{mask}.json"),
-    log:
-        logs("lcc_map_{plot}_{model}_{mask}"),
-    benchmark:
-        benchmarks("lcc_map_{plot}_{model}_{mask}")
+        benchmarks("network_{plot}_{model}_{mask}_{network}")
     conda:
         "../envs/dapple.yaml"
     threads: 1
@@ -131,30 +102,63 @@ rule lcc_map:
         seeds=RETRIEVAL.seeds,
         split=SPLIT,
         split_seed=split_seed,
+        errors=lambda wildcards: ERRORS if wildcards.network == "robust" else None,
+        options=NETWORK,
+        range_ug_cm2=RETRIEVAL.chlorophyll_ug_cm2[:2],
+    message:
+        "{settings.experiment}: {wildcards.network} networks of {wildcards.plot}, {wildcards.model}, {wildcards.mask} pixels"
+    script:
+        "../scripts/network.py"
+
+
+rule lcc_map:
+    input:
+        training=of_model("training_{model}_{mask}.parquet"),
+        networks=networks_of_model,
+        observed=of_model("observed_{mask}.tif"),
+        code=code("lcc_map"),
+    output:
+        maps=made_of_model("map_{model}_{mask}_{network}.tif"),
+        intervals=made_of_model("interval_{model}_{mask}_{network}.json"),
+    log:
+        logs("lcc_map_{plot}_{model}"),
+    benchmark:
+        benchmarks("lcc_map_{plot}_{model}")
+    conda:
+        "../envs/dapple.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+    params:
+        taught=lambda wildcards: taught_by(wildcards.model),
+        seeds=RETRIEVAL.seeds,
+        split=SPLIT,
+        split_seed=split_seed,
+        errors=ERRORS,
         level=RETRIEVAL.interval_level,
         range_quantile=RETRIEVAL.range_quantile,
     message:
-        "{settings.experiment}: chlorophyll of {wildcards.plot} by {wildcards.model}, {wildcards.mask} pixels"
+        "{settings.experiment}: chlorophyll of {wildcards.plot} by {wildcards.model}"
     script:
         "../scripts/lcc_map.py"
 
 
 rule accuracy:
     input:
-        training=plot_file("retrieval/training_{model}_{mask}.parquet"),
-        networks=networks_of,
-        map=plot_file("retrieval/map_{model}_{mask}.tif"),
-        interval=plot_file("retrieval/interval_{model}_{mask}.json"),
+        training=of_model("training_{model}_{mask}.parquet"),
+        networks=networks_of_model,
+        maps=of_model("map_{model}_{mask}_{network}.tif"),
+        intervals=of_model("interval_{model}_{mask}_{network}.json"),
         crowns=plot_crowns,
         code=code("accuracy"),
     output:
-        accuracy=plot_file("retrieval/accuracy_{model}_{mask}.csv"),
-        trees=plot_file("retrieval/trees_{model}_{mask}.csv"),
-        tests=plot_file("retrieval/tests_{model}_{mask}.parquet"),
+        accuracy=plot_file("retrieval/accuracy_{model}.csv"),
+        trees=plot_file("retrieval/trees_{model}.csv"),
+        tests=plot_file("retrieval/tests_{model}.parquet"),
     log:
-        logs("accuracy_{plot}_{model}_{mask}"),
+        logs("accuracy_{plot}_{model}"),
     benchmark:
-        benchmarks("accuracy_{plot}_{model}_{mask}")
+        benchmarks("accuracy_{plot}_{model}")
     conda:
         "../envs/dapple.yaml"
     threads: 1
@@ -162,21 +166,25 @@ rule accuracy:
         mem_mb=2000,
     params:
         plot="{plot}",
-        model="{model}",
-        mask="{mask}",
+        taught=lambda wildcards: taught_by(wildcards.model),
         seeds=RETRIEVAL.seeds,
         split=SPLIT,
         split_seed=split_seed,
+        errors=ERRORS,
     message:
-        "{settings.experiment}: accuracy in {wildcards.plot} of {wildcards.model}, {wildcards.mask} pixels"
+        "{settings.experiment}: accuracy of {wildcards.model} in {wildcards.plot}"
     script:
         "../scripts/accuracy.py"
 
 
 rule accuracy_table:
     input:
-        accuracy=retrieval_files("accuracy_{model}_{mask}.csv"),
-        map=retrieval_files("map_{model}_{mask}.tif")[0],
+        accuracy=[
+            results(f"plots/{plot}/retrieval/accuracy_{model}.csv")
+            for plot in CHLOROPHYLL.plots
+            for model in RETRIEVAL.models
+        ],
+        map=retrieval_files("map_{model}_{mask}_{network}.tif")[0],
         code=code("accuracy_table"),
     output:
         accuracy=results("chlorophyll/accuracy.csv"),
@@ -198,14 +206,22 @@ rule accuracy_table:
 
 rule chlorophyll_figures:
     input:
-        accuracy=of_plot("accuracy_{model}_{mask}.csv"),
-        trees=of_plot("trees_{model}_{mask}.csv"),
-        tests=of_plot("tests_{model}_{mask}.parquet"),
+        accuracy=[
+            plot_file(f"retrieval/accuracy_{model}.csv") for model in RETRIEVAL.models
+        ],
+        trees=[plot_file(f"retrieval/trees_{model}.csv") for model in RETRIEVAL.models],
+        tests=[
+            plot_file(f"retrieval/tests_{model}.parquet") for model in RETRIEVAL.models
+        ],
         training=of_plot("training_{model}_{mask}.parquet"),
-        histories=histories_of,
+        histories=of_plot("history_{model}_{mask}_{network}.csv"),
         pixels=plot_file("retrieval/pixels.csv"),
         canopy=plot_file("retrieval/canopy.tif"),
-        map=plot_file(f"retrieval/map_{TAUGHT[0][0]}_{TAUGHT[0][1]}.tif"),
+        map=plot_file(
+            "retrieval/map_{model}_{mask}_{network}.tif".format(
+                plot="{plot}", **TAUGHT[0]
+            )
+        ),
         crowns=plot_crowns,
         code=code("chlorophyll_figures"),
     output:

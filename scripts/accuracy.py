@@ -1,4 +1,4 @@
-"""Score one model and mask on simulated entries and on trees with known chlorophyll."""
+"""Score the networks of one model on simulated entries and on trees with known chlorophyll."""
 
 import numpy as np
 import pandas as pd
@@ -6,6 +6,7 @@ import pandas as pd
 from dapple.formats import json, polygons, rasters
 from dapple.formats.atomic import atomic
 from dapple.retrieval import evaluation, intervals, maps, network, training
+from dapple.retrieval.noise import Noise
 from dapple.workflow import run
 
 N_SHOWN = 20_000
@@ -13,38 +14,54 @@ N_SHOWN = 20_000
 
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
-    interval = json.read(inputs.interval)["interval"]
-    interval = intervals.Interval(
-        np.array(interval["edges"]), np.array(interval["width"]),
-        interval["factor"], interval["level"],
+    scores, trees, shown = [], [], []
+    files = zip(
+        params.taught, inputs.training, np.reshape(inputs.networks, (-1, len(params.seeds))),
+        inputs.maps, inputs.intervals, strict=True,
     )  # fmt: skip
-    rows, shown = simulated(inputs, params, interval)
-    field_rows, table = field(inputs, params)
-    names = {"plot": params.plot, "model": params.model, "mask": params.mask}
-    scores = pd.DataFrame([names | row for row in [*rows, *field_rows]])
-    columns = [*evaluation.COLUMNS, *scores.columns.difference(evaluation.COLUMNS, sort=False)]
-    write(scores[columns], snakemake.output.accuracy)
-    write(table.assign(**names), snakemake.output.trees)
+    for taught, table_path, network_paths, map_path, interval_path in files:
+        interval = json.read(interval_path)["interval"]
+        interval = intervals.Interval(
+            np.array(interval["edges"]), np.array(interval["width"]),
+            interval["factor"], interval["level"],
+        )  # fmt: skip
+        networks = [network.read(path) for path in network_paths]
+        rows, some = simulated(pd.read_parquet(table_path), networks, interval, params)
+        field_rows, table = field(map_path, inputs.crowns, params.seeds)
+        scores += [{"plot": params.plot} | taught | row for row in [*rows, *field_rows]]
+        trees.append(table.assign(plot=params.plot, **taught))
+        shown.append(some.assign(**taught))
+    scores = pd.DataFrame(scores)
+    extra = scores.columns.difference(evaluation.COLUMNS, sort=False)
+    write(scores[[*evaluation.COLUMNS, *extra]], snakemake.output.accuracy)
+    write(pd.concat(trees), snakemake.output.trees)
     with atomic(snakemake.output.tests) as partial:
-        shown.assign(model=params.model, mask=params.mask).to_parquet(partial, index=False)
+        pd.concat(shown).to_parquet(partial, index=False)
 
 
-def simulated(inputs, params, interval):
-    """Scores on both kinds of test entries, and some entries to show."""
-    frame = pd.read_parquet(inputs.training)
+def simulated(frame, networks, interval, params):
+    """Scores on the kinds of test entries, and some entries to show.
+
+    Test sets: `entries`, cells of combinations that also taught; `combinations`, leaves and soils
+    never seen; `noisy`, these with errors in their bands.
+    """
     parts = network.split(
         frame["combination"].to_numpy(), seed=params.split_seed, **dict(params.split)
     )
-    networks = [network.read(path) for path in inputs.networks]
+    features, target = training.features(frame), frame["chlorophyll_ug_cm2"].to_numpy(float)
+    noisy = Noise(**params.errors).add(features, np.random.default_rng(params.split_seed))
     rows = []
-    for test_set in ("entries", "combinations"):
-        chosen = frame.iloc[parts[test_set]]
-        truth = chosen["chlorophyll_ug_cm2"].to_numpy(float)
-        each = np.array([network.predict(one, training.features(chosen)) for one in networks])
-        mean, spread = each.mean(axis=0), each.std(axis=0)
-        held = intervals.coverage(*intervals.bounds(interval, mean, spread), truth)
+    for test_set, part, bands in (
+        ("entries", "entries", features),
+        ("combinations", "combinations", features),
+        ("noisy", "combinations", noisy),
+    ):
+        truth = target[parts[part]]
+        each = np.array([network.predict(one, bands[parts[part]]) for one in networks])
+        mean = each.mean(axis=0)
+        ends = intervals.bounds(interval, mean, each.std(axis=0))
         of_seeds = evaluation.over_seeds(truth, dict(zip(params.seeds, each, strict=True)))
-        of_seeds[-1]["coverage"] = held
+        of_seeds[-1]["coverage"] = intervals.coverage(*ends, truth)
         rows += [{"test_set": test_set} | row for row in of_seeds]
         if test_set == "entries":
             shown = pd.DataFrame({"truth_ug_cm2": truth, "predicted_ug_cm2": mean})
@@ -52,25 +69,28 @@ def simulated(inputs, params, interval):
     return rows, shown
 
 
-def field(inputs, params):
+def field(map_path, crowns_path, seeds):
     """Scores on trees, and the trees."""
-    found, crowns = rasters.read(inputs.map), polygons.read(inputs.crowns)
-    polygons.require_crs(crowns, found.crs, inputs.crowns)
+    found, crowns = rasters.read(map_path), polygons.read(crowns_path)
+    polygons.require_crs(crowns, found.crs, crowns_path)
     table = evaluation.trees(
         found.values, crowns.geometries, crowns.names, crowns.lcc_ug_cm2,
-        left_m=found.left_m, top_m=found.top_m, cell_m=found.pixel_m, where=inputs.crowns,
+        left_m=found.left_m, top_m=found.top_m, cell_m=found.pixel_m, where=crowns_path,
     )  # fmt: skip
-    new = ["predicted_ug_cm2" if band == maps.MAP_BANDS[0] else band for band in found.bands]
-    table = table.rename(columns={f"predicted_{k}": band for k, band in enumerate(new)})
-    table = table.rename(columns={"outside": "outside_share"})
+    new = {maps.MAP_BANDS[0]: "predicted_ug_cm2", "outside": "outside_share"}
+    names = {f"predicted_{k}": new.get(band, band) for k, band in enumerate(found.bands)}
+    table = table.rename(columns=names)
     missing = table["covered_share"] == 0
     print(f"{missing.sum()} of {len(table)} crowns have no pixel: {list(table['tree'][missing])}")
     truth = table["truth_ug_cm2"].to_numpy()
-    each = {seed: table[f"seed_{seed}_ug_cm2"].to_numpy() for seed in params.seeds}
+    each = {seed: table[f"seed_{seed}_ug_cm2"].to_numpy() for seed in seeds}
     rows = evaluation.over_seeds(truth, each)
-    rows[-1]["coverage"] = intervals.coverage(
-        table["low_ug_cm2"].to_numpy(), table["high_ug_cm2"].to_numpy(), truth
-    )
+    rows[-1] |= {
+        "coverage": intervals.coverage(
+            table["low_ug_cm2"].to_numpy(), table["high_ug_cm2"].to_numpy(), truth
+        ),
+        "outside_share": float(table["outside_share"].mean()),
+    }
     rows = [{"test_set": "field", "n_without_pixels": int(missing.sum())} | row for row in rows]
     return rows, table
 

@@ -1,7 +1,5 @@
 """Figures of one plot: scatter plots, spectra, losses, map."""
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 
@@ -23,40 +21,46 @@ def main(snakemake):
     trees = pd.concat([pd.read_csv(path) for path in inputs.trees])
     own = accuracy[accuracy["test_set"] == "field"]
     style.save(chlorophyll.field(trees, own), output.field)
-    entries = pd.concat(
-        [quantiles(pd.read_parquet(path, columns=list(training.BANDS)), *pair)
-         for path, pair in zip(inputs.training, params.taught, strict=True)]
-    )  # fmt: skip
-    style.save(chlorophyll.spectra(pd.read_csv(inputs.pixels), entries), output.spectra)
-    style.save(chlorophyll.losses(histories(inputs.histories)), output.losses)
+    entries = {
+        path: quantiles(pd.read_parquet(path, columns=list(training.BANDS)), taught)
+        for path, taught in zip(inputs.training, params.taught, strict=True)
+    }
+    figure = chlorophyll.spectra(pd.read_csv(inputs.pixels), pd.concat(entries.values()))
+    style.save(figure, output.spectra)
+    histories = [
+        pd.read_csv(path).assign(**taught)
+        for path, taught in zip(inputs.histories, params.taught, strict=True)
+    ]
+    style.save(chlorophyll.losses(pd.concat(histories)), output.losses)
     images, found = rasters.read(inputs.canopy), rasters.read(inputs.map)
     crowns = polygons.read(inputs.crowns)
-    corner = np.array([found.left_m, found.top_m])
-    rings = [(np.asarray(ring) - corner) * (1, -1) for ring in crowns.outlines()]
+    rings, truth = outlines(crowns, np.array([found.left_m, found.top_m]))
     figure = chlorophyll.chlorophyll_map(
         found.values[:5],
         cell_m=found.pixel_m,
         size_m=(images.right_m - images.left_m, images.top_m - images.bottom_m),
         rings=rings,
-        truth=crowns.lcc_ug_cm2,
+        truth=truth,
     )
     style.save(figure, output.map)
 
 
-def quantiles(frame, model, mask):
+def outlines(crowns, corner):
+    """Outer rings from the north-west corner east and south [m], and the chlorophyll of each."""
+    rings, truth = [], []
+    for geometry, true in zip(crowns.geometries, crowns.lcc_ug_cm2, strict=True):
+        parts = geometry["coordinates"]
+        for part in [parts] if geometry["type"] == "Polygon" else parts:
+            rings.append((np.asarray(part[0], float)[:, :2] - corner) * (1, -1))
+            truth.append(true)
+    return rings, truth
+
+
+def quantiles(frame, taught):
     """Quantiles of the bands of a training set."""
     table = frame.quantile(list(QUANTILES.values())).T.set_axis(list(QUANTILES), axis=1)
     table["wavelength_nm"] = table.index.astype(int)
-    return table.assign(model=model, mask=mask)
-
-
-def histories(paths):
-    """Loss curves of all networks, told apart by the names of their files."""
-    tables = []
-    for path in paths:
-        _, *model, mask, seed = Path(path).stem.split("_")
-        tables.append(pd.read_csv(path).assign(model="_".join(model), mask=mask, seed=int(seed)))
-    return pd.concat(tables)
+    return table.assign(model=taught["model"], mask=taught["mask"])
 
 
 if __name__ == "__main__":

@@ -12,9 +12,7 @@ from dapple.formats.atomic import atomic
 from dapple.frames import direction_from_angles
 from dapple.light.scene import Optics
 from dapple.optics import soil
-from dapple.retrieval import (
-    coefficients as collision,
-)
+from dapple.retrieval import coefficients as collision
 from dapple.retrieval import comparison, direct, parameters, semiless, spectra
 from dapple.streams import stream_seed
 from dapple.workflow import options, run
@@ -65,13 +63,13 @@ def main(snakemake):
     )
 
 
-def combinations(params, n, seed, **fixed):
+def combinations(params, number, seed, **fixed):
     """Leaf and soil parameters drawn by chance, and their spectra."""
     settings = params["leaves_and_soils"]
     ranges = {name: parameters.Range(*row) for name, row in settings["ranges"].items()}
     ranges |= {name: parameters.Range(value, value, 1) for name, value in fixed.items()}
     drawn = parameters.draw(
-        n,
+        number,
         seed=seed,
         table=ranges,
         jitter_steps=settings["jitter_steps"],

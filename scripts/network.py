@@ -1,4 +1,4 @@
-"""Train one network on one training set."""
+"""Train networks on one training set, one per seed."""
 
 import time
 
@@ -6,6 +6,7 @@ import pandas as pd
 
 from dapple.formats.atomic import atomic
 from dapple.retrieval import network, training
+from dapple.retrieval.noise import Noise
 from dapple.workflow import run
 
 
@@ -17,26 +18,30 @@ def main(snakemake):
     )
     features, target = training.features(frame), frame["chlorophyll_ug_cm2"].to_numpy()
     margin = 0.1 * (params.range_ug_cm2[1] - params.range_ug_cm2[0])
-    start = time.perf_counter()
-    net, history = network.train(
-        features[parts["train"]],
-        target[parts["train"]],
-        features[parts["validation"]],
-        target[parts["validation"]],
-        seed=int(params.seed),
-        low=params.range_ug_cm2[0] - margin,
-        high=params.range_ug_cm2[1] + margin,
-        **dict(params.network),
-    )
-    best = history.loc[history["validation_loss"].idxmin()]
-    print(
-        f"{len(parts['train'])} entries, {len(history)} epochs in "
-        f"{time.perf_counter() - start:.1f} s, best at epoch {best['epoch']:.0f}, "
-        f"validation loss {best['validation_loss']:.5f}"
-    )
-    network.write(snakemake.output.network, net)
+    histories = []
+    for seed, path in zip(params.seeds, snakemake.output.networks, strict=True):
+        start = time.perf_counter()
+        net, history = network.train(
+            features[parts["train"]],
+            target[parts["train"]],
+            features[parts["validation"]],
+            target[parts["validation"]],
+            seed=seed,
+            low=params.range_ug_cm2[0] - margin,
+            high=params.range_ug_cm2[1] + margin,
+            noise=Noise(**params.errors) if params.errors else None,
+            **dict(params.options),
+        )
+        best = history.loc[history["validation_loss"].idxmin()]
+        print(
+            f"seed {seed}: {len(parts['train'])} entries, {len(history)} epochs in "
+            f"{time.perf_counter() - start:.1f} s, best at epoch {best['epoch']:.0f}, "
+            f"validation loss {best['validation_loss']:.5f}"
+        )
+        network.write(path, net)
+        histories.append(history.assign(seed=seed))
     with atomic(snakemake.output.history) as partial:
-        history.to_csv(partial, index=False, float_format="%.6g")
+        pd.concat(histories).to_csv(partial, index=False, float_format="%.6g")
 
 
 if __name__ == "__main__":

@@ -9,14 +9,18 @@ from dapple.workflow import run
 TEXT = {"label": str, "failed": str}
 
 
+ENOUGH = 500
+"""Rows from which a half of them can teach the verdict on the other."""
+
+
 def main(snakemake):
     outputs = snakemake.output
     points = pd.concat(
         [pd.read_csv(path, dtype=TEXT) for path in snakemake.input.batches], ignore_index=True
     )
     points = thresholds.against_harmless(points)
-    if snakemake.input.model:
-        points["flagged"] = training.flagged(points, verdict.load(snakemake.input.model))
+    for column, with_records in (("flagged", True), ("flagged_scan", False)):
+        points[column] = judged(points, snakemake.input.model, with_records)
     tables = {
         outputs.points: points,
         outputs.thresholds: thresholds.table(points),
@@ -26,6 +30,13 @@ def main(snakemake):
         with atomic(path) as partial:
             table.to_csv(partial, index=False, float_format="%.6g")
     print(f"{len(points)} runs, {points['r'].isna().sum()} of them without a result")
+
+
+def judged(points, model, with_records):
+    """Verdicts by models that were not fitted to the run judged; a few runs by the stored ones."""
+    if len(points) >= ENOUGH:
+        return training.cross_flagged(points, with_records=with_records)
+    return training.flagged(points, verdict.load(model, with_records=with_records)) if model else ""
 
 
 if __name__ == "__main__":

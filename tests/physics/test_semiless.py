@@ -105,7 +105,7 @@ def test_t2_is_what_sun_and_view_have_in_common():
 def test_t2_is_nothing_where_sun_and_view_meet_other_leaves():
     mean, _ = means(layer(), direction_from_angles(50.0, 120.0))
     rho_so, t1, rho_dd, product = terms(mean)
-    assert abs(product) < 0.03 * rho_dd * t1
+    assert abs(product) < 0.06 * rho_dd * t1
     assert semiless.formula(rho_so, t1, rho_dd, product, 0.35) == pytest.approx(
         mean(0.35), abs=1e-4
     )
@@ -114,7 +114,7 @@ def test_t2_is_nothing_where_sun_and_view_meet_other_leaves():
 def test_the_fit_holds_for_its_own_leaf_structure_and_less_for_others():
     window = Window(-0.5, 0.5, 0.1, 10, 10)
     sun = direction_from_angles(50.0, 120.0)
-    traced_once = image_paths.trace(traced.load(layer()), window, sun, n_paths=64, seed=1)
+    traced_once = image_paths.trace(traced.load(layer()), window, sun, n_paths=32, seed=1)
     share = [0.3, 0.2, 0.1]
     fitted = semiless.fit(traced_once, share)
     error = {}

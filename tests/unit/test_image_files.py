@@ -85,7 +85,7 @@ def test_noise_is_told_apart_from_error():
     assert abs(table.loc["cell", "rmse_beyond_noise"]) < 0.3 * noise
     table = comparison.compare(biased, reference, ("840",)).set_index("scale")
     assert table.loc["cell", "rmse_beyond_noise"] == pytest.approx(0.02, rel=0.05)
-    assert table.loc["image", "bias"] == pytest.approx(0.02, rel=0.02)
+    assert table.loc["image", "bias"] == pytest.approx(0.02, rel=0.06)
 
 
 def test_a_mesh_of_an_unknown_kind_is_an_error():

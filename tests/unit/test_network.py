@@ -7,6 +7,7 @@ import pytest
 
 from dapple.errors import InputError
 from dapple.retrieval import intervals, network
+from dapple.retrieval.noise import Noise
 
 SMALL = {"hidden": (32, 16, 8), "batch": 64, "max_epochs": 60, "patience": 60}
 
@@ -163,3 +164,26 @@ def test_bands_beyond_those_that_taught_are_told():
     strange = features[:50] * np.array([1.0, 3.0, 1.0, 1.0, 1.0], np.float32)
     assert intervals.outside(taught, strange).all()
     assert intervals.outside(taught, np.full((1, 5), np.nan)).all()
+
+
+def test_errors_have_the_deviations_that_were_asked_for():
+    bright, dark = np.full((50_000, 5), 0.4, np.float32), np.zeros((50_000, 5), np.float32)
+    noise = Noise(relative=0.03, relative_common=0.04, absolute=0.006, absolute_common=0.008)
+    rng = np.random.default_rng(1)
+    found = noise.add(dark, rng)
+    assert found.std() == pytest.approx(0.01, rel=0.02)
+    assert np.corrcoef(found[:, 0], found[:, 4])[0, 1] == pytest.approx(0.64, abs=0.02)
+    # 0.4 × 0.05 beside 0.01
+    assert noise.add(bright, rng).std() == pytest.approx(np.hypot(0.02, 0.01), rel=0.02)
+
+
+def test_a_network_taught_with_errors_is_less_misled_by_them():
+    fine = {**SMALL, "max_epochs": 40}
+    noise = Noise(0.2, 0.0, 0.0, 0.0)
+    features, target = world(2000, seed=5)
+    disturbed = noise.add(features, np.random.default_rng(2))
+    error = {}
+    for name, errors in (("exact", None), ("robust", noise)):
+        net, _ = network.train(*world(2000), *world(300, seed=2), seed=3, noise=errors, **fine)
+        error[name] = np.sqrt(np.mean((network.predict(net, disturbed) - target) ** 2))
+    assert error["robust"] < 0.8 * error["exact"]

@@ -34,7 +34,7 @@ def test_the_outline_of_a_disc_is_the_disc():
 
 
 def test_cover_counts_overlapping_crowns_once():
-    crowns = [DISC + [10, 10], DISC + [10, 10], DISC + [0, 0]]
+    crowns = [DISC + 10.0, DISC + 10.0, DISC]
     of_disc = area_m2(DISC)
     assert plots.cover(crowns, SIZE_M) == pytest.approx(1.25 * of_disc / 600, rel=0.01)
 

@@ -8,7 +8,8 @@ import pytest
 from dapple.errors import InputError
 from dapple.formats import polygons
 
-SQUARE = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]) + [612_000.0, 5_324_000.0]
+CORNER = np.array([612_000.0, 5_324_000.0])
+SQUARE = CORNER + np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import rasterio
-from rasterio.transform import Affine, from_origin
+from rasterio.transform import Affine
 
 from dapple.errors import InputError
 from dapple.formats import rasters
@@ -21,7 +21,7 @@ def image():
 
 def tiff(path, values, *, crs="EPSG:25832", transform=None, bands=BANDS, **profile):
     """A GeoTIFF as other programs write it."""
-    transform = transform or from_origin(612_000.0, 5_324_015.0, 0.5, 0.5)
+    transform = transform or Affine(0.5, 0, 612_000, 0, -0.5, 5_324_015)
     with rasterio.open(
         path, "w", driver="GTiff", count=len(values), height=values.shape[1],
         width=values.shape[2], dtype=values.dtype, crs=crs, transform=transform, **profile,
@@ -72,7 +72,7 @@ def test_a_file_without_a_coordinate_system_is_refused(tmp_path):
 def test_degrees_are_refused(tmp_path):
     path = tiff(
         tmp_path / "a.tif", np.zeros((2, 4, 4), np.float32), crs="EPSG:4326",
-        transform=from_origin(10.0, 48.0, 1e-5, 1e-5),
+        transform=Affine(1e-5, 0, 10, 0, -1e-5, 48),
     )  # fmt: skip
     with pytest.raises(InputError, match="projected"):
         rasters.read(path)

@@ -110,10 +110,12 @@ def test_the_slats_take_half_of_the_energy(layered):
     assert leaf_energy / (leaf_energy + ground_energy) == pytest.approx(0.5, abs=0.05)
 
 
-def test_intensity_is_that_of_a_plate_under_the_line(bare):
-    nadir = np.abs(bare.attributes["ScanAngle"]) < 3
-    expected = 0.3 * uav_scanner.WHITE_INTENSITY
-    assert np.median(bare.attributes["Intensity"][nadir]) == pytest.approx(expected, rel=0.03)
+def test_intensity_falls_with_the_cosine_of_incidence_and_the_square_of_range(bare):
+    cosine = np.cos(np.radians(bare.attributes["ScanAngle"]))
+    expected = 0.3 * uav_scanner.WHITE_INTENSITY * cosine**3
+    for part in (cosine > 0.97, cosine < 0.9):
+        ratio = bare.attributes["Intensity"][part] / expected[part]
+        assert np.median(ratio) == pytest.approx(1.0, abs=0.02)
 
 
 def test_the_same_seed_gives_the_same_bytes(bare):

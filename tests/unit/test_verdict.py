@@ -195,7 +195,7 @@ def test_what_cannot_be_known_is_never_green(models):
 
 
 def test_a_run_is_as_good_as_its_best_method(models):
-    careless = models["voxels_1.0"] | {"amber": 0.0, "red": 0.0}
+    careless = models["voxels_1.0"] | {"amber": -9.0, "red": -9.0}
     judged = verdict.judge(usual_signals(), METHODS, models | {"voxels_1.0": careless})
     assert judged["methods"]["voxels_1.0"]["state"] == "red"
     assert judged["state"] == "green"

@@ -210,8 +210,8 @@ def _knots(start_m, along_m, time_s, lines, window_s):
         if found is None:
             continue
         place, step = found
-        times += [middle - 0.5 * half, middle + 0.5 * half]
-        places += [place - 0.5 * step, place + 0.5 * step]
+        times += [middle - half, middle + half]
+        places += [place - step, place + step]
     return (np.array(times), np.array(places)) if times else None
 
 

@@ -20,11 +20,30 @@ LABELS = {
     "prosail": "PROSAIL",
     "sunlit": "sunlit pixels",
     "all": "all pixels",
+    "robust": "robust",
+    "published": "as published",
 }
 RANGE_UG_CM2 = (0.0, 80.0)
 
 
-def _grid(rows: Sequence[str], columns: Sequence[str], width_in: float, height_in: float):
+def _rows(table: pd.DataFrame) -> list[tuple[str, str]]:
+    """Pairs of mask and kind of network, in their order."""
+    return list(dict.fromkeys(zip(table["mask"], table["network"], strict=True)))
+
+
+def _of(table: pd.DataFrame, row: tuple[str, str], model: str) -> pd.DataFrame:
+    mask, network = row
+    return table[
+        (table["mask"] == mask) & (table["network"] == network) & (table["model"] == model)
+    ]
+
+
+def _title(row: tuple[str, str], model: str) -> str:
+    mask, network = row
+    return f"{LABELS[model]}, {LABELS[mask]}\n{LABELS[network]}"
+
+
+def _grid(rows: Sequence, columns: Sequence, width_in: float, height_in: float):
     figure = style.new_figure(width_in * len(columns) + 0.9, height_in * len(rows) + 0.2)
     panels = figure.subplots(len(rows), len(columns), sharex=True, sharey=True, squeeze=False)
     return figure, panels
@@ -46,23 +65,23 @@ def _equality(axes: Axes) -> None:
 
 @style.styled
 def simulated(tests: pd.DataFrame, accuracy: pd.DataFrame, *, cells: int = 40) -> Figure:
-    """Predictions of simulated entries against their truth, by model and mask.
+    """Predictions of simulated entries against their truth, by model, mask and network.
 
     Parameters
     ----------
     tests : DataFrame
-        `model, mask, truth_ug_cm2, predicted_ug_cm2`.
+        `model, mask, network, truth_ug_cm2, predicted_ug_cm2`.
     accuracy : DataFrame
-        Scores of the same `model, mask`, written into the panels.
+        Scores of the same `model, mask, network`, written into the panels.
     cells : int
         Hexagons along one axis.
     """
-    masks, models = (list(dict.fromkeys(tests[key])) for key in ("mask", "model"))
-    figure, panels = _grid(masks, models, 2.5, 2.6)
+    rows, models = _rows(tests), list(dict.fromkeys(tests["model"]))
+    figure, panels = _grid(rows, models, 2.4, 2.6)
     drawn = []
-    for i, mask in enumerate(masks):
+    for i, row in enumerate(rows):
         for j, model in enumerate(models):
-            own = tests[(tests["mask"] == mask) & (tests["model"] == model)]
+            own = _of(tests, row, model)
             axes = panels[i, j]
             drawn.append(
                 axes.hexbin(
@@ -72,8 +91,8 @@ def simulated(tests: pd.DataFrame, accuracy: pd.DataFrame, *, cells: int = 40) -
                 )
             )  # fmt: skip
             _equality(axes)
-            axes.set_title(f"{LABELS[model]}, {LABELS[mask]}")
-            scores = accuracy[(accuracy["mask"] == mask) & (accuracy["model"] == model)]
+            axes.set_title(_title(row, model))
+            scores = _of(accuracy, row, model)
             if len(scores):
                 _numbers(axes, scores.iloc[0])
     top = max((hexes.get_array().max() for hexes in drawn if len(hexes.get_array())), default=1)
@@ -88,28 +107,28 @@ def simulated(tests: pd.DataFrame, accuracy: pd.DataFrame, *, cells: int = 40) -
 
 @style.styled
 def field(trees: pd.DataFrame, accuracy: pd.DataFrame) -> Figure:
-    """Predictions of trees against their known chlorophyll, by model and mask.
+    """Predictions of trees against their known chlorophyll, by model, mask and network.
 
     Parameters
     ----------
     trees : DataFrame
-        `model, mask, truth_ug_cm2, predicted_ug_cm2, low_ug_cm2, high_ug_cm2`.
+        `model, mask, network, truth_ug_cm2, predicted_ug_cm2, low_ug_cm2, high_ug_cm2`.
     accuracy : DataFrame
-        Scores of the same `model, mask`, written into the panels.
+        Scores of the same `model, mask, network`, written into the panels.
     """
-    masks, models = (list(dict.fromkeys(trees[key])) for key in ("mask", "model"))
-    figure, panels = _grid(masks, models, 2.5, 2.6)
-    for i, mask in enumerate(masks):
+    rows, models = _rows(trees), list(dict.fromkeys(trees["model"]))
+    figure, panels = _grid(rows, models, 2.4, 2.6)
+    for i, row in enumerate(rows):
         for j, model in enumerate(models):
-            own = trees[(trees["mask"] == mask) & (trees["model"] == model)]
+            own = _of(trees, row, model)
             axes = panels[i, j]
             axes.vlines(own["truth_ug_cm2"], own["low_ug_cm2"], own["high_ug_cm2"],
                         color=COLOURS[model], alpha=0.25, lw=1)  # fmt: skip
             axes.plot(own["truth_ug_cm2"], own["predicted_ug_cm2"], "o", ms=3.5,
                       color=COLOURS[model], mec="white", mew=0.4)  # fmt: skip
             _equality(axes)
-            axes.set_title(f"{LABELS[model]}, {LABELS[mask]}")
-            scores = accuracy[(accuracy["mask"] == mask) & (accuracy["model"] == model)]
+            axes.set_title(_title(row, model))
+            scores = _of(accuracy, row, model)
             if len(scores):
                 _numbers(axes, scores.iloc[0])
     figure.supxlabel(f"chlorophyll of the tree [{UNIT}]", fontsize=9)
@@ -158,14 +177,14 @@ def losses(histories: pd.DataFrame) -> Figure:
     Parameters
     ----------
     histories : DataFrame
-        `model, mask, seed, epoch, train_loss, validation_loss`.
+        `model, mask, network, seed, epoch, train_loss, validation_loss`.
     """
-    masks, models = (list(dict.fromkeys(histories[key])) for key in ("mask", "model"))
-    figure, panels = _grid(masks, models, 2.5, 1.9)
-    for i, mask in enumerate(masks):
+    pairs, models = _rows(histories), list(dict.fromkeys(histories["model"]))
+    figure, panels = _grid(pairs, models, 2.4, 1.9)
+    for i, pair in enumerate(pairs):
         for j, model in enumerate(models):
             axes = panels[i, j]
-            own = histories[(histories["mask"] == mask) & (histories["model"] == model)]
+            own = _of(histories, pair, model)
             for seed, rows in own.groupby("seed"):
                 first = seed == own["seed"].min()
                 for key, colour in (("train_loss", "#8C8C8C"), ("validation_loss", COLOURS[model])):
@@ -173,7 +192,7 @@ def losses(histories: pd.DataFrame) -> Figure:
                     axes.plot(rows["epoch"], rows[key], color=colour, lw=0.9,
                               label=label if first else None)  # fmt: skip
             axes.set(yscale="log")
-            axes.set_title(f"{LABELS[model]}, {LABELS[mask]}")
+            axes.set_title(_title(pair, model))
     panels[0, 0].legend()
     figure.supxlabel("epoch", fontsize=9)
     figure.supylabel("mean squared error of scaled targets", fontsize=9)

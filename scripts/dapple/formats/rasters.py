@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pyproj
 import rasterio
-from rasterio.transform import from_origin
+from rasterio.transform import Affine
 
 from dapple.errors import InputError
 from dapple.formats.atomic import atomic
@@ -114,7 +114,7 @@ def write(path: str | Path, raster: Raster) -> None:
             count=count,
             dtype="float32",
             crs=raster.crs,
-            transform=from_origin(raster.left_m, raster.top_m, raster.pixel_m, raster.pixel_m),
+            transform=Affine(raster.pixel_m, 0, raster.left_m, 0, -raster.pixel_m, raster.top_m),
             nodata=np.nan,
             compress="deflate",
             predictor=3,

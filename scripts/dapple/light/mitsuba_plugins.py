@@ -4,6 +4,7 @@ from functools import cache
 
 import drjit as dr
 import mitsuba
+import numpy as np
 
 from dapple.light.phase import NORM, reflected_quantile_table
 
@@ -99,6 +100,9 @@ def _painted_class(variant: str) -> type:
         def __init__(self, props):
             props["reflectance"] = props["transmittance"] = mi.ScalarColor3f(0.0)
             super().__init__(props)
+            # A kernel is made for all scenes that are alive, those not yet painted too.
+            self.assign(np.zeros(1, np.uint32))
+            self.paint(*np.zeros((2, 1, 3), np.float32))
 
         def assign(self, of_face):
             """Give each triangle (t,) the number of its material."""

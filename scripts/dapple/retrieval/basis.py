@@ -23,6 +23,8 @@ LEAST_ASYMMETRY, MORE_ASYMMETRY = 0.3, 0.65
 PROSPECT with N from 1 to 2.5 stays within, from bright near infrared to blue, where all that
 leaves a leaf comes from its surface.
 """
+LEAST_SQUARE = 1e-13
+"""Functions that matter less than this, as a share of the first one's square, are rounding."""
 
 
 @dataclass(frozen=True)
@@ -88,9 +90,12 @@ def fit(orders: np.ndarray, light: np.ndarray, n_columns: int, seed: int) -> Bas
     share = light / light.sum()
     factor = spectral_factor(orders, made_for)
     middle = share @ factor
-    _, size, ways = np.linalg.svd(np.sqrt(share)[:, None] * (factor - middle), full_matrices=False)
-    kept = min(n_columns - 1, int((size > 1e-9 * size.max(initial=1e-300)).sum()))
-    return Basis(made_for, middle, ways[:kept].T / size[:kept])
+    weighted = np.sqrt(share)[:, None] * (factor - middle)
+    # Right singular vectors by way of a small matrix: there are many more kinds than nodes.
+    square, ways = np.linalg.eigh(weighted.T @ weighted)
+    square, ways = square[::-1], ways[:, ::-1]
+    kept = min(n_columns - 1, int((square > LEAST_SQUARE * square[0]).sum()))
+    return Basis(made_for, middle, ways[:, :kept] / np.sqrt(square[:kept]))
 
 
 def projector(values: np.ndarray, light: np.ndarray) -> np.ndarray:

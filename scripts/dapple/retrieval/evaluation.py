@@ -7,7 +7,10 @@ import pandas as pd
 
 from dapple.errors import InputError
 
-COLUMNS = ("plot", "model", "mask", "test_set", "n", "r2", "rmse", "rrmse", "seed", "bias")
+COLUMNS = (
+    "plot", "model", "mask", "test_set", "n", "r2", "rmse", "rrmse",
+    "network", "seed", "bias", "coverage",
+)  # fmt: skip
 
 
 def scores(truth: np.ndarray, prediction: np.ndarray) -> dict[str, float]:

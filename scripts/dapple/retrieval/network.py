@@ -12,6 +12,7 @@ import pandas as pd
 
 from dapple.errors import InputError
 from dapple.formats.atomic import atomic
+from dapple.retrieval.noise import Noise
 
 # One thread: sums in one order, so that a seed gives the same weights whatever the machine's cores.
 os.environ |= {"JAX_PLATFORMS": "cpu", "NPROC": "1"}
@@ -116,6 +117,7 @@ def train(
     batch: int = 512,
     max_epochs: int = 30,
     patience: int = 12,
+    noise: Noise | None = None,
 ) -> tuple[Network, pd.DataFrame]:
     """Train a network.
 
@@ -143,6 +145,8 @@ def train(
     patience : int
         Epochs without a better validation loss after which training stops. The weights of the
         best epoch are kept.
+    noise : Noise or None
+        Errors that are added to the bands, new ones in every epoch, and to those of validation.
 
     Returns
     -------
@@ -162,6 +166,8 @@ def train(
     rng = np.random.default_rng(seed)
     mean, scale = features.mean(axis=0, dtype=np.float64), features.std(axis=0, dtype=np.float64)
     mean, scale = mean.astype(np.float32), np.maximum(scale, 1e-6).astype(np.float32)
+    if noise:
+        validation_features = noise.add(validation_features, rng)
     x, x_valid = ((f - mean) / scale for f in (features, validation_features))
     y, y_valid = (
         ((t - low) / (high - low)).astype(np.float32) for t in (target, validation_target)
@@ -184,6 +190,8 @@ def train(
     best, best_loss, best_epoch, rows = weights, np.inf, 0, []
     for epoch in range(1, max_epochs + 1):
         losses = []
+        if noise:
+            x = (noise.add(features, rng) - mean) / scale
         for rows_of_batch in _batches(rng.permutation(len(x)), batch):
             weights, state, value = step(weights, state, x[rows_of_batch], y[rows_of_batch])
             losses.append(value)

@@ -56,10 +56,10 @@ SIGNALS = {
     ),
     "unknown_share": Signal(1, "{value:.0%} of the crown's volume is unknown", MORE_SCANS),
     "unknown_on_sun_beams": Signal(
-        1, "{value:.0%} of the way from sun to sensors in the crown is unknown", MORE_SCANS
+        1, "{value:.0%} of the way of light through the crown is unknown", MORE_SCANS
     ),
     "seen_on_sun_beams": Signal(
-        -1, "the scan sees {value:.0%} of the leaves between sun and sensors", OCCLUDED
+        -1, "the scan sees {value:.0%} of the leaves on the way of light", OCCLUDED
     ),
     "reflectance_separation": Signal(
         -1, "reflectances of two kinds lie {value:.1f} deviations apart (Ashman's D)", CLASSES

@@ -59,6 +59,10 @@ def _of_scan(evidence: Evidence, fine: xr.Dataset | None) -> dict[str, float]:
                 fine, evidence.sensors_m, evidence.sun_zenith_deg, evidence.sun_azimuth_deg, rng
             )
             coverage |= {"unknown_on_sun_beams": unknown, "seen_on_sun_beams": seen}
+        else:
+            # Light may come from anywhere: what holds for the crown holds for its way, on average.
+            coverage["unknown_on_sun_beams"] = coverage["unknown_share"]
+            coverage["seen_on_sun_beams"] = signals_scan.seen_share(fine)
     return found | coverage | signals_scan.reflectance_classes(cloud, rng)
 
 

@@ -46,16 +46,23 @@ def direct_share(light: xr.Dataset | None) -> float:
 
 
 def best_lag_min(
-    light: xr.Dataset | None, measured: xr.DataArray | None, *, max_lag_min: int = 15
+    light: xr.Dataset | None,
+    measured: xr.DataArray | None,
+    *,
+    max_lag_min: int = 15,
+    max_step_min: float = 20.0,
 ) -> float:
     """Clock offset at which simulated light fits the records best, minutes either way.
 
-    Both are drawn minute by minute between their times; sensors are pooled.
+    Both are drawn minute by minute between their times, which lie no further apart than
+    `max_step_min`; sensors are pooled.
     """
     if light is None or measured is None:
         return math.nan
     simulated, records, when, recorded = _paired(light, measured)
-    if when[-1] - when[0] < 4 * max_lag_min:
+    if not len(records) or when[-1] - when[0] < 4 * max_lag_min:
+        return math.nan
+    if np.median(np.diff(when)) > max_step_min:
         return math.nan
     first, last = max(when[0], recorded[0]), min(when[-1], recorded[-1])
     minute = np.arange(first, last + 0.5)
@@ -80,6 +87,8 @@ def misplaced_share(
         return math.nan
     here, records, when, recorded = _paired(light, measured)
     there = _paired(shifted, measured)[0]
+    if not len(records):
+        return math.nan
     at = np.array([np.interp(when, recorded, row) for row in records])
     misfit_here, misfit_there = (((one - at) ** 2).mean(axis=1) for one in (here, there))
     differs = np.abs(misfit_there - misfit_here) > 1e-9 * at.var()
@@ -89,13 +98,21 @@ def misplaced_share(
 def _paired(
     light: xr.Dataset, measured: xr.DataArray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """PAR of light and records by sensor and time, and their times in minutes; gaps are bridged."""
+    """PAR of light and records by sensor and time, and their times in minutes.
+
+    Sensors without records for a fifth of the time are left out, gaps of the others bridged.
+    """
     both = np.intersect1d(light["sensor"].to_numpy(), measured["sensor"].to_numpy())
-    start = light["time"].to_numpy()[0]
-    simulated = light[PAR].sel(sensor=both).transpose("sensor", "time")
     records = measured.sel(sensor=both).transpose("sensor", "time")
-    records = records.dropna("time", how="any") if records.isnull().any() else records
-    minutes = [
+    kept = both[records.notnull().mean("time").to_numpy() >= 0.8]
+    start = light["time"].to_numpy()[0]
+    simulated = light[PAR].sel(sensor=kept).transpose("sensor", "time")
+    records = records.sel(sensor=kept)
+    when, recorded = (
         (one["time"].to_numpy() - start) / np.timedelta64(1, "m") for one in (simulated, records)
-    ]
-    return simulated.to_numpy(), records.to_numpy(), *minutes
+    )
+    values = records.to_numpy().copy()
+    for row in values:
+        gap = np.isnan(row)
+        row[gap] = np.interp(recorded[gap], recorded[~gap], row[~gap])
+    return simulated.to_numpy(), values, when, recorded

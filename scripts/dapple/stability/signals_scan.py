@@ -50,6 +50,12 @@ def unknown_share(voxels: xr.Dataset) -> float:
     return float(unknown[inside].mean()) if inside.any() else math.nan
 
 
+def seen_share(voxels: xr.Dataset) -> float:
+    """Mean over the crown of the chance that the scan meets a patch of leaf there."""
+    coverage = occlusion.coverage_m_m3(voxels)[in_crown(voxels)]
+    return float(-np.expm1(-coverage * PATCH_M2).mean()) if coverage.size else math.nan
+
+
 def in_crown(voxels: xr.Dataset) -> np.ndarray:
     """(nx, ny, nz) True for leafy voxels and for unknown ones among them (`occlusion.in_crown`)."""
     return occlusion.in_crown(voxels[DENSITY].transpose("x", "y", "z").to_numpy())

@@ -65,7 +65,7 @@ def _marked(points: pd.DataFrame) -> pd.DataFrame:
 
 
 def prepared(points: pd.DataFrame) -> pd.DataFrame:
-    """Runs with `loss`, `is_failure` and `ran`, undisturbed runs that all stressors share only once."""
+    """Runs with `loss`, `is_failure` and `ran`; undisturbed runs that stressors share only once."""
     marked = _marked(points)
     harmless = marked["harmless"].astype(bool)
     # Levels with other conditions than the undisturbed run's have other results and stay.
@@ -88,7 +88,8 @@ def fit(
     undisturbed: pd.DataFrame | None = None,
     with_records: bool = False,
     penalty: float = 10.0,
-    most_false_alarms: float = 0.08,
+    most_false_alarms: float = 0.1,
+    least_loss: float = 0.15,
 ) -> dict[str, dict]:
     """Learn which signals go with losses, for each method by itself.
 
@@ -105,6 +106,8 @@ def fit(
     most_false_alarms : float
         Share of sound runs above the threshold of alarm, each judged by models fitted to others;
         a fifth of it is above that of red.
+    least_loss : float
+        No smaller expected loss raises an alarm, however rare it is.
 
     Returns
     -------
@@ -120,7 +123,9 @@ def fit(
     models = {}
     for method, rows in runs[runs["ran"]].groupby("reconstruction"):
         if (~rows["is_failure"]).sum() >= MIN_RUNS:
-            models[str(method)] = _fit_one(rows, undisturbed, names, penalty, most_false_alarms)
+            models[str(method)] = _fit_one(
+                rows, undisturbed, names, penalty, most_false_alarms, least_loss
+            )
     return models
 
 
@@ -130,6 +135,7 @@ def _fit_one(
     names: list[str],
     penalty: float,
     most: float,
+    least: float,
 ) -> dict:
     learned = {}
     for name in names:
@@ -152,12 +158,12 @@ def _fit_one(
         learned[name]["weight"] = round(value, 4)
     failed = rows["is_failure"].to_numpy(bool)
     sound = _out_of_fold(x, loss, penalty)[~failed]
-    amber, red = (float(np.quantile(sound, 1 - share)) for share in (most, 0.2 * most))
+    amber, red = (max(float(np.quantile(sound, 1 - p)), least) for p in (most, 0.2 * most))
     return {
         "signals": {name: facts for name, facts in learned.items() if facts["weight"] > 0},
         "intercept": intercept,
         "amber": amber,
-        "red": max(red, amber),
+        "red": red,
         "runs": len(rows),
         "failures": int(failed.sum()),
     }

@@ -14,6 +14,9 @@ N_NODES = 96
 N_SHARES = 8
 """Pulses are summed in so many groups, each in order: the same sums on any number of threads."""
 
+MOST_FOR_LONGEST = 100_000
+"""Pulses that are asked for the longest path."""
+
 TOLERANCE = 2.0
 """Voxels by which a return may lie above the stretch that it ends."""
 
@@ -104,8 +107,9 @@ def trace(
         Each stretch of a pulse inside one part is a path of its own. It carries the light that no
         earlier return stopped.
     """
-    # A part's longest path is that through the whole grid at worst; nodes reach the longest met.
-    longest = _longest(grid.part, grid.corner_m, grid.size_m, start_m, direction)
+    # Some pulses tell how far nodes have to reach; a longer path is extrapolated from the last two.
+    some = slice(None, None, 1 + len(start_m) // MOST_FOR_LONGEST)
+    longest = _longest(grid.part, grid.corner_m, grid.size_m, start_m[some], direction[some])
     length = np.linspace(0.0, max(longest, grid.size_m), N_NODES)
     sums = _trace(
         grid.part,

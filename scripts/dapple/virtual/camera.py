@@ -5,6 +5,7 @@ leaves are strips of needles and not facets, every tree has its own optics, the 
 paths have no largest order, and light is traced band by band in Mitsuba's integrator.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,8 +27,8 @@ CHUNK_RAYS = 1 << 20
 ROULETTE_DEPTH = 3
 """Weak paths are ended by chance from here on; without a largest order nothing is cut off."""
 
-SUN_WEIGHT = 4.0
-"""So often is the sun asked for light where the sky is asked once: about its share of the light."""
+SUN_WEIGHT = 8.0
+"""So often is the sun asked for light where the sky is asked once: that has the least noise."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +133,7 @@ def photograph(
     sun_zenith_deg: float,
     sun_azimuth_deg: float,
     diffuse_share: np.ndarray,
-    paths_per_pixel: int,
+    paths_per_pixel: Sequence[int],
     seed: int,
 ) -> np.ndarray:
     """Reflectance of every pixel in every band.
@@ -145,8 +146,8 @@ def photograph(
         Azimuth clockwise from north [°].
     diffuse_share : (b,) float
         Of the light on level ground: what comes from a sky of even radiance, not from the sun.
-    paths_per_pixel : int
-        Spread evenly over the pixel.
+    paths_per_pixel : sequence of int
+        For every three bands that are traced together; spread evenly over the pixel.
     seed : int
         Same seed, same image.
 
@@ -171,13 +172,13 @@ def photograph(
         )
     towards_sun = direction_from_angles(sun_zenith_deg, sun_azimuth_deg)
     image = np.empty((n_bands, camera.rows * camera.columns), np.float32)
-    for first in range(0, n_bands, 3):
+    for first, paths in zip(range(0, n_bands, 3), paths_per_pixel, strict=True):
         bands = list(range(first, min(first + 3, n_bands)))
         padded = np.array([bands[min(k, len(bands) - 1)] for k in range(3)])
         scene.paint(bands)
         scene.render.set_sun(towards_sun, (1 - diffuse[padded]) / towards_sun[2])
         scene.render.set_sky(lambda zenith, azimuth: np.ones_like(zenith), diffuse[padded])
-        seen = _expose(scene, camera, paths_per_pixel, stream_seed(seed, "bands", first))
+        seen = _expose(scene, camera, paths, stream_seed(seed, "bands", first))
         image[bands] = np.pi * seen[: len(bands)]
     return image.reshape(n_bands, camera.rows, camera.columns)
 

@@ -104,7 +104,7 @@ HABITS = {
         shoot_angle_deg=30.0,
     ),
 }
-"""Plausible habits, drawn after photographs of both genera; not fitted to any tree."""
+"""Plausible habits of both genera; not fitted to any tree."""
 
 
 @dataclass(frozen=True)

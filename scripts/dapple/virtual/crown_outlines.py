@@ -20,7 +20,7 @@ def outline(leaf_vertices_m: np.ndarray, n_sectors: int = N_SECTORS) -> np.ndarr
         reaches as far as 98 % of the corners, averaged with its two neighbours.
     """
     x, y = leaf_vertices_m[:, 0], leaf_vertices_m[:, 1]
-    sector = (np.arctan2(y, x) / (2 * np.pi) * n_sectors).astype(np.int64) % n_sectors
+    sector = np.floor(np.arctan2(y, x) / (2 * np.pi) * n_sectors).astype(np.int64) % n_sectors
     distance = np.hypot(x, y)
     reach = np.array(
         [

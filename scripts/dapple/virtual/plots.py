@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 from rasterio.features import rasterize
-from rasterio.transform import from_origin
+from rasterio.transform import Affine
 
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
@@ -79,7 +79,7 @@ def _covered(crowns, size_m, pixel_m=COVER_PIXEL_M) -> np.ndarray:
     shapes = [
         {"type": "Polygon", "coordinates": [np.concatenate([r, r[:1]]).tolist()]} for r in crowns
     ]
-    transform = from_origin(0.0, size_m[1], size_m[0] / shape[1], size_m[1] / shape[0])
+    transform = Affine(size_m[0] / shape[1], 0, 0, 0, -size_m[1] / shape[0], size_m[1])
     return rasterize(shapes, shape, transform=transform, dtype=np.uint8).astype(bool)
 
 

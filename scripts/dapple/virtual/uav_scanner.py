@@ -1,7 +1,7 @@
 """A laser scanner under a UAV: parallel flight lines over a world, several returns a pulse."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,9 @@ CHUNK_PULSES = 1 << 16
 
 WHITE_INTENSITY = 20_000
 """Intensity of a white plate that takes the whole beam at the flying height."""
+
+TURN_S = 10.0
+"""From the end of one flight line to the start of the next."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,7 @@ class Flight:
     """
 
     height_m: float = 50.0
-    line_spacing_m: float = 20.0
+    line_spacing_m: float = 17.5
     half_swath_deg: float = 35.0
     pulses_per_m2: float = 950.0
     speed_m_s: float = 5.0
@@ -216,8 +219,27 @@ def lines_m(flight: Flight, low_m: np.ndarray, high_m: np.ndarray) -> np.ndarray
 
 def _sweeps(flight: Flight, low_m, high_m, ground_z_m, seed) -> Iterator[Pulses]:
     """Pulses of some seconds of flight, those that are aimed at the area."""
+    per_metre, n_across = _pulse_rate(flight)
+    # Crowns stand above the ground: beams that pass over the edge may still meet them.
+    length_m = high_m[1] - low_m[1] + 10.0
+    n_sweeps, at_once, number = int(np.ceil(length_m * per_metre / n_across)), 256, 0
+    for line, x in enumerate(lines_m(flight, low_m, high_m), start=1):
+        start = np.array([x, 0.5 * (low_m[1] + high_m[1]), ground_z_m + flight.height_m])
+        begun_s = (line - 1) * (length_m / flight.speed_m_s + TURN_S)
+        for begin in range(0, n_sweeps, at_once):
+            rng = np.random.default_rng(stream_seed(seed, "sweeps", number))
+            number += 1
+            sweep = np.arange(begin, min(begin + at_once, n_sweeps))
+            place_m = (sweep[:, None] * n_across + np.arange(n_across)).ravel() / per_metre
+            angle = _mirror(flight, sweep, n_across, rng)
+            pulses = _shot(flight, line, start, place_m, place_m - 0.5 * length_m, angle, rng)
+            pulses = replace(pulses, time_s=pulses.time_s + begun_s)
+            yield _select(pulses, _aimed(pulses, low_m, high_m, flight.height_m))
+
+
+def _pulse_rate(flight: Flight) -> tuple[float, int]:
+    """Pulses a metre of line, and pulses a sweep, so that all lines together are dense enough."""
     swath_m = 2 * flight.height_m * np.tan(np.radians(flight.half_swath_deg))
-    # So many pulses a metre of line that all lines together give the density asked for.
     per_metre = flight.pulses_per_m2 * flight.line_spacing_m
     per_sweep = per_metre * flight.speed_m_s / flight.scan_lines_per_s
     if per_sweep < 2 or swath_m < flight.line_spacing_m:
@@ -228,43 +250,27 @@ def _sweeps(flight: Flight, low_m, high_m, ground_z_m, seed) -> Iterator[Pulses]
             "at least 2 pulses, and a swath that reaches the next line",
             "Fire more pulses, fly more lines or widen the swath.",
         )
-    n_across = round(per_sweep)
-    sweep_m = n_across / per_metre
-    # Crowns stand above the ground: beams that pass over the edge may still meet them.
-    length_m = high_m[1] - low_m[1] + 10.0
-    n_sweeps, at_once = int(np.ceil(length_m / sweep_m)), 256
-    turn_s, number = length_m / flight.speed_m_s + 10.0, 0
+    return per_metre, round(per_sweep)
+
+
+def _mirror(flight: Flight, sweep: np.ndarray, n_across: int, rng) -> np.ndarray:
+    """Angle of each pulse [rad]: even steps on level ground, to and fro."""
     across = (np.arange(n_across) + 0.5) / n_across
-    for line, x in enumerate(lines_m(flight, low_m, high_m), start=1):
-        north = 1.0 if line % 2 else -1.0
-        for begin in range(0, n_sweeps, at_once):
-            rng = np.random.default_rng(stream_seed(seed, "sweeps", number))
-            number += 1
-            sweep = np.arange(begin, min(begin + at_once, n_sweeps))
-            place = (sweep[:, None] + across).ravel()
-            # Even steps on level ground; the mirror goes to and fro.
-            side = np.where(sweep[:, None] % 2, -1.0, 1.0) * (2 * across - 1)
-            aside = np.clip(side.ravel() + rng.normal(0, 1e-3, len(place)), -1, 1)
-            angle = np.arctan(aside * np.tan(np.radians(flight.half_swath_deg)))
-            along = north * (place * sweep_m - 0.5 * length_m)
-            origin = np.column_stack(
-                [
-                    np.full(len(place), x),
-                    0.5 * (low_m[1] + high_m[1]) + along,
-                    np.full(len(place), ground_z_m + flight.height_m),
-                ]
-            )
-            pitch = rng.normal(0.0, 2e-3, len(place))
-            direction = np.column_stack([north * np.sin(angle), pitch, -np.cos(angle)])
-            direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-            pulses = Pulses(
-                origin,
-                direction,
-                (line - 1) * turn_s + place * sweep_m / flight.speed_m_s,
-                np.degrees(angle),
-                np.full(len(place), line, np.uint16),
-            )
-            yield _select(pulses, _aimed(pulses, low_m, high_m, flight.height_m))
+    side = np.where(sweep[:, None] % 2, -1.0, 1.0) * (2 * across - 1)
+    aside = np.clip(side.ravel() + rng.normal(0, 1e-3, side.size), -1, 1)
+    return np.arctan(aside * np.tan(np.radians(flight.half_swath_deg)))
+
+
+def _shot(flight: Flight, line: int, start, place_m, along_m, angle, rng) -> Pulses:
+    """Pulses of one line; odd lines fly north, even ones south."""
+    n, north = len(angle), 1.0 if line % 2 else -1.0
+    origin = np.tile(start, (n, 1))
+    origin[:, 1] += north * along_m
+    pitch = rng.normal(0.0, 2e-3, n)
+    direction = np.column_stack([north * np.sin(angle), pitch, -np.cos(angle)])
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    time_s = place_m / flight.speed_m_s
+    return Pulses(origin, direction, time_s, np.degrees(angle), np.full(n, line, np.uint16))
 
 
 def _aimed(pulses: Pulses, low_m, high_m, height_m: float) -> np.ndarray:
