@@ -207,8 +207,8 @@ class Retrieval(Section):
     last_rate_share: Share = _(0.01, "share of the rate to which it falls, along a cosine")
     weight_decay: NotNegative = _(0.001, "of Adam, decoupled from the gradient", ZHAO)
     batch: Count = _(512, "entries of one step")
-    max_epochs: Count = _(24, "most passes over all entries")
-    patience: Count = _(10, "epochs without a better validation after which training stops")
+    max_epochs: Count = _(10, "most passes over all entries")
+    patience: Count = _(5, "epochs without a better validation after which training stops")
     test_share: Annotated[float, Gt(0), Lt(1)] = _(0.2, "of entries that test", ZHAO)
     held_share: Annotated[float, Gt(0), Lt(0.5)] = _(
         0.1, "of combinations that validate, and as many that test: none of them teaches"

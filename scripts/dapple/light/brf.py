@@ -334,7 +334,8 @@ def _bounce(scene, origin, direction, rng, orders, weight, sun, thinned):
     push = dr.select(voxel, 0.0, scene.ray_offset)
     start = point + dr.select(same_side, normal, -normal) * push
     lit = event & (same_side | leaf)
-    sunlight = scene.transmittance(start, mi.Vector3f(sun), lit) * dr.abs(towards) / sun.z
+    sunlight = scene.transmittance(start, mi.Vector3f(sun), lit, coherent=False)
+    sunlight *= dr.abs(towards) / sun.z
     # Light on a leaf goes either way for certain, without the chance that 2^(a + b) undoes.
     sunlight *= dr.select(leaf, 0.5, 1.0)
     reflects, others = dr.select(same_side, 1, 1 << 8), dr.select(bark, 1 << 16, 1 << 24)

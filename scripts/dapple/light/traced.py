@@ -135,13 +135,17 @@ class TracedScene:
         return point, normal, leaf, voxel, bark, ground
 
     @dr.syntax
-    def transmittance(self, origin, direction, active):
-        """Share of light that gets through along rays to the sky; 0 where they are not active."""
+    def transmittance(self, origin, direction, active, coherent=True):
+        """Share of light that gets through along rays to the sky; 0 where they are not active.
+
+        `coherent` says that neighbouring rays start at neighbouring points: rays in bundles are
+        fast for those and take twice the time of single rays for others.
+        """
         mi = self.mi
         if dr.hint(self.cell is None, mode="scalar"):
             if dr.hint(self.meshes is not None, mode="scalar"):
                 active &= ~self.meshes.ray_test(
-                    mi.Ray3f(origin, direction), coherent=True, active=active
+                    mi.Ray3f(origin, direction), coherent=coherent, active=active
                 )
             passed = mi.Float(1)
             if dr.hint(self.grid is not None, mode="scalar"):
