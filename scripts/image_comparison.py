@@ -57,9 +57,8 @@ def main(snakemake):
     write(snakemake.output.speed, fast)
     print(fast.to_string())
     print(
-        f"direct: {len(seconds)} renders of {n_paths} paths a pixel took {each:.2f} s each (scene "
-        f"once {seconds.build_s:.2f} s, not counted); times {n} combinations; direct_same_paths: "
-        f"times {share:.2f}, in proportion to the paths"
+        f"direct: {len(seconds)} renders of {n_paths} paths a pixel took {each:.2f} s each, times "
+        f"{n} combinations; direct_same_paths: times {share:.2f}, in proportion to the paths"
     )
 
 
@@ -80,17 +79,12 @@ def combinations(params, number, seed, **fixed):
     return drawn, spectra.spectra(drawn, model, prospect_version=settings["prospect_version"])
 
 
-class Seconds(list):
-    """Render times, and the mean time to hand over the scene."""
-
-    build_s = 0.0
-
-
 def renders(scene, traced, properties, light, params):
     """Means of direct renders of every combination, their times and paths per pixel."""
     sun = direction_from_angles(params["sun"]["zenith_deg"], params["sun"]["azimuth_deg"])
     bark, share = light
-    parts, seconds = [], Seconds()
+    renderer = direct.Renderer(scene, variant=params["variant"])
+    parts, seconds = [], []
     for k in range(-1, len(properties)):  # the first is not counted: kernels are compiled
         row = max(k, 0)
         optics = Optics(
@@ -100,22 +94,20 @@ def renders(scene, traced, properties, light, params):
             np.full(len(BANDS), bark),
             properties.soil_reflectance[row],
         )
-        made = direct.render(
-            scene,
+        made = renderer.render(
             traced.window,
             sun,
             optics,
             share,
             n_paths=params["direct_paths"],
             seed=stream_seed(params["seed"], k),
-            variant=params["variant"],
         )
         if k < 0:
             continue
         parts.append(comparison.of_passes(made.passes, traced.window, traced.cell_m))
-        seconds.append(made.render_s)
-        seconds.build_s += made.build_s / len(properties)
-        print(f"render {k}: {made.build_s:.2f} + {made.render_s:.2f} s")
+        seconds.append(made.seconds)
+        print(f"render {k}: {made.seconds:.2f} s")
+    print(f"scene handed over in {renderer.build_s:.2f} s, which is not counted")
     return comparison.together(parts), seconds, made.n_paths
 
 

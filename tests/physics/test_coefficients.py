@@ -169,8 +169,8 @@ def test_north_is_up_and_shade_falls_away_from_the_sun():
     west = direction_from_angles(45.0, 90.0)  # the sun in the east: shade 2 m to the west
     seen = trace(scene, sun=west)
     bright = image(seen, rho=0.5, soil=0.2)
-    rendered = direct.render(
-        scene, WINDOW, west, Optics(*(np.array([x]) for x in (800.0, 0.5, 0.0, 0.0, 0.2))),
+    rendered = direct.Renderer(scene).render(
+        WINDOW, west, Optics(*(np.array([x]) for x in (800.0, 0.5, 0.0, 0.0, 0.2))),
         np.zeros(1), n_paths=16, seed=1,
     ).image[0]  # fmt: skip
     for one in (bright, rendered):
@@ -186,7 +186,9 @@ def test_direct_renders_agree(of_canopy):
         ))
     )  # fmt: skip
     share = np.array([0.4, 0.3, 0.2, 0.1])
-    made = direct.render(canopy(), WINDOW, SUN, optics, share, n_paths=256, n_passes=4, seed=2)
+    made = direct.Renderer(canopy()).render(
+        WINDOW, SUN, optics, share, n_paths=256, n_passes=4, seed=2
+    )
     ours = coefficients.images(
         of_canopy, optics.leaf_reflectance, optics.leaf_transmittance, optics.bark_reflectance,
         optics.ground_reflectance, share,
@@ -196,6 +198,19 @@ def test_direct_renders_agree(of_canopy):
     assert (np.abs(difference) < 4 * np.hypot(error, 1.5e-3)).all()
     pixels = np.corrcoef(made.image[0].ravel(), ours[0].ravel())[0, 1]
     assert pixels > 0.95
+
+
+def test_a_renderer_takes_new_colours_every_time():
+    renderer = direct.Renderer(canopy())
+    dark, bright = (
+        Optics(*(np.array([x]) for x in (800.0, *values)))
+        for values in ((0.02, 0.01, 0.0, 0.05), (0.5, 0.4, 0.0, 0.4))
+    )
+    settings = {"n_paths": 16, "seed": 3}
+    once = renderer.render(WINDOW, SUN, bright, [0.2], **settings).image
+    assert renderer.render(WINDOW, SUN, dark, [0.2], **settings).image.mean() < 0.2 * once.mean()
+    again = renderer.render(WINDOW, SUN, bright, [0.2], **settings).image
+    np.testing.assert_allclose(again, once, rtol=1e-5)
 
 
 def test_a_sun_below_the_horizon_is_an_error():

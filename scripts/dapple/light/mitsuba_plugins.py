@@ -47,6 +47,14 @@ def _leaf_class(variant: str) -> type:
             ]
             self.m_flags = self.m_components[0] | self.m_components[1]
 
+        def traverse(self, callback):
+            for name in ("reflectance", "transmittance"):
+                callback.put(name, getattr(self, name), +mi.ParamFlags.NonDifferentiable)
+
+        def parameters_changed(self, keys):
+            self.reflected_share = _split(self.reflectance, self.transmittance)
+            dr.make_opaque(self.reflectance, self.transmittance, self.reflected_share)
+
         def optics(self, si, active):
             """Reflectance, transmittance, and the chance that scattered light is reflected."""
             return self.reflectance, self.transmittance, self.reflected_share

@@ -4,7 +4,6 @@ The reference for images made of paths that were traced once: nothing but the me
 of leaves (`light.mitsuba_plugins`) is shared. Colour channels are spectral bands, three at a time.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -16,6 +15,15 @@ from dapple.light.scene import Optics, Scene
 from dapple.retrieval.coefficients import Window
 from dapple.streams import stream_seed
 
+CHANNELS = 3
+COLOURS = {
+    "leaf_mesh.bsdf.reflectance": "leaf_reflectance",
+    "leaf_mesh.bsdf.transmittance": "leaf_transmittance",
+    "wood_mesh.bsdf.brdf_0.reflectance.value": "bark_reflectance",
+    "ground_mesh.bsdf.brdf_0.reflectance.value": "ground_reflectance",
+    "ground.bsdf.reflectance.value": "ground_reflectance",
+}
+"""Mitsuba's names of what has a colour."""
 CAMERA_ABOVE_M = 10.0
 """The camera's plane is so far above the highest plant."""
 
@@ -30,14 +38,13 @@ class Render:
         Reflectance factors; their mean is the image, their spread its noise.
     n_paths : int
         Per pixel in all.
-    build_s, render_s : float
-        Wall time of handing over the scene and of rendering [s].
+    seconds : float
+        Wall time [s].
     """
 
     passes: np.ndarray
     n_paths: int
-    build_s: float
-    render_s: float
+    seconds: float
 
     @property
     def image(self) -> np.ndarray:
@@ -45,102 +52,117 @@ class Render:
         return self.passes.mean(axis=0)
 
 
-def render(
-    scene: Scene,
-    window: Window,
-    sun_direction: np.ndarray,
-    optics: Optics,
-    diffuse_share: np.ndarray,
-    *,
-    n_paths: int,
-    seed: int,
-    n_passes: int = 2,
-    max_depth: int = 128,
-    roulette_depth: int = 5,
-    variant: str = "llvm_ad_rgb",
-) -> Render:
-    """Render one combination of leaves and surfaces.
+class Renderer:
+    """A scene that is handed to Mitsuba once, whatever its leaves, soil and light.
 
     Parameters
     ----------
     scene : Scene
-        Meshes; turbid voxels work too.
-    window : Window
-        The pixels.
-    sun_direction : (3,) float64
-        Unit vector towards the sun, above the horizon.
-    optics : Optics
-        In any number of bands.
-    diffuse_share : (b,) float
-        Of the light on level ground that comes from a sky of even radiance.
-    n_paths : int
-        Per pixel, in equal parts for every pass; rounded up to a grid of strata.
-    seed : int
-        Of the random numbers.
-    n_passes : int
-        Independent images of which the result is the mean.
-    max_depth : int
-        Longest path in segments.
-    roulette_depth : int
-        From this depth on weak paths are ended by chance.
+        Meshes.
     variant : str
         An rgb variant of Mitsuba.
-
-    Returns
-    -------
-    Render
     """
-    mi = engine.load(variant)
-    integrator = mi.load_dict({"type": "path", "max_depth": max_depth, "rr_depth": roulette_depth})
-    per_pass = strata(-(-n_paths // n_passes))
-    camera = mi.load_dict(_camera(mi, window, float(scene.bounds_m[1, 2]), per_pass))
-    images, build_s, render_s = [], 0.0, 0.0
-    for bands in _threes(len(optics)):
+
+    def __init__(self, scene: Scene, *, variant: str = "llvm_ad_rgb"):
         started = perf_counter()
-        some = Optics(*(np.asarray(getattr(optics, k))[bands] for k in Optics.__dataclass_fields__))
-        loaded = mitsuba_scene.build(scene, some, variant=variant)
-        share = np.asarray(diffuse_share, float)[bands]
-        loaded.set_sun(np.asarray(sun_direction), (1 - share) / sun_direction[2])
-        loaded.set_sky(lambda zenith, _: np.ones_like(zenith), share)
-        _weigh_lights(mi, loaded.scene, float(share.mean()))
-        build_s += perf_counter() - started
+        grey = Optics(*np.full((5, CHANNELS), 0.2))
+        self.loaded = mitsuba_scene.build(scene, grey, variant=variant)
+        self.variant, self.top_z_m = variant, float(scene.bounds_m[1, 2])
+        self.build_s = perf_counter() - started
+
+    def render(
+        self,
+        window: Window,
+        sun_direction: np.ndarray,
+        optics: Optics,
+        diffuse_share: np.ndarray,
+        *,
+        n_paths: int,
+        seed: int,
+        n_passes: int = 2,
+        max_depth: int = 128,
+        roulette_depth: int = 5,
+    ) -> Render:
+        """Render one combination of leaves and surfaces.
+
+        Parameters
+        ----------
+        window : Window
+            The pixels.
+        sun_direction : (3,) float64
+            Unit vector towards the sun, above the horizon.
+        optics : Optics
+            In any number of bands.
+        diffuse_share : (b,) float
+            Of the light on level ground that comes from a sky of even radiance.
+        n_paths : int
+            Per pixel, in equal parts for every pass; rounded up to a grid of strata.
+        seed : int
+            Of the random numbers.
+        n_passes : int
+            Independent images of which the result is the mean.
+        max_depth : int
+            Longest path in segments.
+        roulette_depth : int
+            From this depth on weak paths are ended by chance.
+
+        Returns
+        -------
+        Render
+        """
         started = perf_counter()
-        passes = [
-            np.array(
-                mi.render(
-                    loaded.scene,
-                    sensor=camera,
-                    integrator=integrator,
-                    spp=per_pass,
-                    seed=stream_seed(seed, "direct", str(bands), k),
+        mi = engine.load(self.variant)
+        integrator = {"type": "path", "max_depth": max_depth, "rr_depth": roulette_depth}
+        integrator = mi.load_dict(integrator)
+        per_pass = strata(-(-n_paths // n_passes))
+        camera = mi.load_dict(_camera(mi, window, self.top_z_m, per_pass))
+        images = []
+        for low in range(0, len(optics), CHANNELS):
+            bands = slice(low, min(low + CHANNELS, len(optics)))
+            share = self._set(optics, diffuse_share, bands)
+            self.loaded.set_sun(np.asarray(sun_direction), (1 - share) / sun_direction[2])
+            self.loaded.set_sky(lambda zenith, _: np.ones_like(zenith), share)
+            passes = [
+                np.array(
+                    mi.render(
+                        self.loaded.scene,
+                        sensor=camera,
+                        integrator=integrator,
+                        spp=per_pass,
+                        seed=stream_seed(seed, "direct", low, k),
+                    )
                 )
-            )
-            for k in range(n_passes)
-        ]
-        images.append(np.pi * np.stack(passes)[..., : len(some)])
-        render_s += perf_counter() - started
-    stacked = np.concatenate(images, axis=-1).transpose(0, 3, 1, 2).astype(np.float32)
-    return Render(np.ascontiguousarray(stacked), per_pass * n_passes, build_s, render_s)
+                for k in range(n_passes)
+            ]
+            images.append(np.pi * np.stack(passes)[..., : bands.stop - low])
+        stacked = np.concatenate(images, axis=-1).transpose(0, 3, 1, 2)
+        stacked = np.ascontiguousarray(stacked, np.float32)
+        return Render(stacked, per_pass * n_passes, perf_counter() - started)
+
+    def _set(self, optics: Optics, diffuse_share: np.ndarray, bands: slice) -> np.ndarray:
+        """Give leaves and surfaces their colours; returns the diffuse share of the channels."""
+        mi = self.loaded.mi
+
+        def channels(values) -> np.ndarray:
+            some = np.asarray(values, float)[bands]
+            return np.pad(some, (0, CHANNELS - len(some)), mode="edge")
+
+        share = channels(diffuse_share)
+        # Paths ask the sun and the sky for light as often as befits what they bring.
+        sky = float(np.clip(share.mean(), 0.05, 0.95))
+        parameters = mi.traverse(self.loaded.scene)
+        parameters["sun.sampling_weight"], parameters["sky.sampling_weight"] = 1 - sky, sky
+        for key, name in COLOURS.items():
+            if key in parameters:
+                parameters[key] = mi.Color3f(*channels(getattr(optics, name)).tolist())
+        parameters.update()
+        return share
 
 
 def strata(n: int) -> int:
     """The number of samples, at least n, that fills a grid."""
     rows = max(1, int(np.sqrt(n)))
     return rows * -(-n // rows)
-
-
-def _weigh_lights(mi, scene, sky_share: float) -> None:
-    """Let paths ask the sun and the sky for light as often as befits what they bring."""
-    parameters = mi.traverse(scene)
-    sky = min(max(sky_share, 0.05), 0.95)
-    parameters["sun.sampling_weight"], parameters["sky.sampling_weight"] = 1 - sky, sky
-    parameters.update()
-
-
-def _threes(n: int) -> Iterator[slice]:
-    """Slices of at most three bands."""
-    for low in range(0, n, 3):
-        yield slice(low, min(low + 3, n))
 
 
 def _camera(mi, window: Window, top_z_m: float, n_samples: int) -> dict:
