@@ -131,6 +131,15 @@ LEAVES_AND_SOILS = {
     "soil_vectors": RETRIEVAL.soil_vectors
     and str(Path(settings.data_dir) / RETRIEVAL.soil_vectors),
 }
+
+
+def leaves_and_soils(wildcards):
+    """What leaves and soils to simulate for a plot."""
+    return LEAVES_AND_SOILS | {
+        "shoot_recollision": plot_of(wildcards).shoot_recollision
+    }
+
+
 SELECTION = {
     "cell_m": RETRIEVAL.map_pixel_m,
     "sunlit_nir": RETRIEVAL.sunlit_nir,
@@ -223,13 +232,12 @@ def split_seed(wildcards):
 def simulation(wildcards):
     """What the images of a model are made from."""
     made = {
-        "collision_orders": {"simulation": "images/coefficients.nc"},
-        "semi_less": {"simulation": "images/semiless.nc"},
-        "prosail": {"simulation": "scene/leaves.ply"},
+        "collision_orders": ["images/coefficients.nc"],
+        "semi_less": ["images/semiless.nc"],
+        "prosail": ["scene/leaves.ply", "scene/wood.ply"],
     }[wildcards.model]
-    return {
-        key: plot_file(path).format(plot=wildcards.plot) for key, path in made.items()
-    }
+    paths = [plot_file(path).format(plot=wildcards.plot) for path in made]
+    return {"simulation": paths}
 
 
 def simulated_light(wildcards):

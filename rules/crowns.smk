@@ -8,7 +8,7 @@ Makes   plots/{plot}/scene/dem.tif         elevation of the ground
         plots/{plot}/scene/crowns.tif      crowns and sub-crowns by number
         plots/{plot}/scene/summary.json    totals, and how pulses and their light were found
         plots/{plot}/scene/subcrowns.csv   volume and plant area of every sub-crown and layer
-        plots/{plot}/scene/leaves.ply      square facets
+        plots/{plot}/scene/leaves.ply, wood.ply   square facets
         plots/{plot}/scene/terrain.ply     the ground as triangles
         plots/{plot}/scene/crowns.png      what was found, to look at
 """
@@ -93,6 +93,7 @@ rule plot_scene:
     output:
         table=plot_file("scene/subcrowns.csv"),
         leaves=plot_file("scene/leaves.ply"),
+        wood=plot_file("scene/wood.ply"),
         terrain=plot_file("scene/terrain.ply"),
         summary=plot_file("scene/summary.json"),
         picture=plot_file("scene/crowns.png"),
@@ -114,6 +115,7 @@ rule plot_scene:
         alpha_m=CROWNS.alpha_m,
         alpha_spacings=CROWNS.alpha_spacings,
         clumping_index=CROWNS.clumping_index,
+        wood_share=CROWNS.wood_share,
         facet_area_m2=CROWNS.facet_area_m2,
         terrain_step_m=CROWNS.terrain_step_m,
         pulse_options={

@@ -1,7 +1,7 @@
 """
 Images: simulated UAV images of many leaves and soils from one trace.
 
-Needs   plots/{plot}/scene/leaves.ply, terrain.ply, summary.json
+Needs   plots/{plot}/scene/leaves.ply, wood.ply, terrain.ply, summary.json
         plots/{plot}/world/images.tif, or the user's: its place and size
 Makes   plots/{plot}/images/coefficients.nc   what every pixel receives, for any leaf and soil
         plots/{plot}/images/semiless.nc       the terms of Semi-LESS, fitted to the same paths
@@ -15,6 +15,7 @@ Makes   plots/{plot}/images/coefficients.nc   what every pixel receives, for any
 rule image_coefficients:
     input:
         leaves=plot_file("scene/leaves.ply"),
+        wood=plot_file("scene/wood.ply"),
         terrain=plot_file("scene/terrain.ply"),
         summary=plot_file("scene/summary.json"),
         images=plot_images,
@@ -79,6 +80,7 @@ rule image_semiless:
 rule image_comparison:
     input:
         leaves=plot_file("scene/leaves.ply"),
+        wood=plot_file("scene/wood.ply"),
         terrain=plot_file("scene/terrain.ply"),
         coefficients=plot_file("images/coefficients.nc"),
         semiless=plot_file("images/semiless.nc"),
@@ -99,7 +101,7 @@ rule image_comparison:
     resources:
         mem_mb=3000,
     params:
-        leaves_and_soils=LEAVES_AND_SOILS,
+        leaves_and_soils=leaves_and_soils,
         sun=plot_sun,
         diffuse_share=lambda wildcards: plot_of(wildcards).diffuse_share,
         bark=IMAGES.bark_reflectance,

@@ -2,7 +2,7 @@
 Retrieval: from simulated images to a network, from observed images to a map of chlorophyll.
 
 Needs   plots/{plot}/world/images.tif, crowns.geojson      or the user's
-        plots/{plot}/scene/chm.tif, leaves.ply, summary.json
+        plots/{plot}/scene/chm.tif, leaves.ply, wood.ply, summary.json
         plots/{plot}/images/coefficients.nc, semiless.nc
 Makes   plots/{plot}/retrieval/canopy.tif                  pixels that see the canopy
         plots/{plot}/retrieval/observed_{mask}.tif         means of observed pixels by cell
@@ -63,7 +63,7 @@ rule training_set:
     resources:
         mem_mb=4000,
     params:
-        leaves_and_soils=LEAVES_AND_SOILS,
+        leaves_and_soils=leaves_and_soils,
         light=simulated_light,
         selection=SELECTION,
         max_entries=RETRIEVAL.max_entries,

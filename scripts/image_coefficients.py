@@ -29,8 +29,9 @@ def main(snakemake):
     )
     n_paths = max(params["paths_per_pixel"], -(-params["least_paths"] // window.n_pixels))
     started = time.perf_counter()
+    scene = scenes.read_plot(inputs.leaves, inputs.wood, inputs.terrain)
     coefficients = image_paths.trace(
-        traced.load(scenes.read_plot(inputs.leaves, inputs.terrain), params["variant"]),
+        traced.load(scene, params["variant"]),
         window,
         direction_from_angles(params["sun"]["zenith_deg"], params["sun"]["azimuth_deg"]),
         n_paths=n_paths,

@@ -11,9 +11,8 @@ from dapple.formats import json, scenes
 from dapple.formats.atomic import atomic
 from dapple.frames import direction_from_angles
 from dapple.light.scene import Optics
-from dapple.optics import soil
 from dapple.retrieval import coefficients as collision
-from dapple.retrieval import comparison, direct, parameters, semiless, spectra
+from dapple.retrieval import comparison, direct, semiless, spectra
 from dapple.streams import stream_seed
 from dapple.workflow import options, run
 
@@ -25,10 +24,12 @@ PER_STRUCTURE = 64
 
 def main(snakemake):
     params, inputs = options(snakemake.params), snakemake.input
-    scene = scenes.read_plot(inputs.leaves, inputs.terrain)
+    scene = scenes.read_plot(inputs.leaves, inputs.wood, inputs.terrain)
     traced, fitted = files.read(inputs.coefficients), files.read_semiless(inputs.semiless)
     light = params["bark"], np.asarray(params["diffuse_share"])
-    drawn, properties = combinations(params, params["direct_renders"], params["seed"])
+    drawn, properties = spectra.combinations(
+        params["leaves_and_soils"], params["direct_renders"], seed=params["seed"]
+    )
     reference, seconds, n_paths = renders(scene, traced, properties, light, params)
     direct_peak_mb = peak_mb()
     found = methods(traced, fitted, properties, light)
@@ -62,23 +63,6 @@ def main(snakemake):
     )
 
 
-def combinations(params, number, seed, **fixed):
-    """Leaf and soil parameters drawn by chance, and their spectra."""
-    settings = params["leaves_and_soils"]
-    ranges = {name: parameters.Range(*row) for name, row in settings["ranges"].items()}
-    ranges |= {name: parameters.Range(value, value, 1) for name, value in fixed.items()}
-    drawn = parameters.draw(
-        number,
-        seed=seed,
-        table=ranges,
-        jitter_steps=settings["jitter_steps"],
-        chlorophyll_per_carotenoid=settings["chlorophyll_per_carotenoid"],
-        water_cm=settings["water_cm"],
-    )
-    model = soil.choose(settings["soil_vectors"])
-    return drawn, spectra.spectra(drawn, model, prospect_version=settings["prospect_version"])
-
-
 def renders(scene, traced, properties, light, params):
     """Means of direct renders of every combination, their times and paths per pixel."""
     sun = direction_from_angles(params["sun"]["zenith_deg"], params["sun"]["azimuth_deg"])
@@ -91,7 +75,7 @@ def renders(scene, traced, properties, light, params):
             np.array(BANDS, float),
             properties.leaf_reflectance[row],
             properties.leaf_transmittance[row],
-            np.full(len(BANDS), bark),
+            np.asarray(bark),
             properties.soil_reflectance[row],
         )
         made = renderer.render(
@@ -131,7 +115,9 @@ def structures(traced, fitted, light, params):
     tables = []
     for structure in STRUCTURES:
         seed = stream_seed(params["seed"], "structure")
-        _, properties = combinations(params, PER_STRUCTURE, seed, n=structure)
+        _, properties = spectra.combinations(
+            params["leaves_and_soils"], PER_STRUCTURE, seed=seed, n=structure
+        )
         found = methods(traced, fitted, properties, light)
         exact = found["collision_orders"]
         exact = comparison.Means(exact.cells, np.zeros_like(exact.variance), exact.pixels)
@@ -161,7 +147,8 @@ def per_combination(drawn, properties, reference, found):
 def speed(traced, fitted, light, params, inputs):
     """Time of images of many combinations by both fast methods, with what they need before."""
     n = params["speed_combinations"]
-    _, properties = combinations(params, n, stream_seed(params["seed"], "speed"))
+    seed = stream_seed(params["seed"], "speed")
+    _, properties = spectra.combinations(params["leaves_and_soils"], n, seed=seed)
     leaf, ground = optics_of(properties)
     tracing, fitting = json.read(inputs.tracing), json.read(inputs.fitting)
     bark, share = light

@@ -3,6 +3,8 @@
 import resource
 import time
 
+import numpy as np
+
 from dapple.formats import coefficients as files
 from dapple.formats import json
 from dapple.retrieval import semiless
@@ -19,7 +21,7 @@ def main(snakemake):
         n_levels=params["levels"],
         structure=params["structure"],
         degree=params["degree"],
-        bark=params["bark"],
+        bark=float(np.mean(params["bark"])),
         soils=(0.0, *params["soils"]),
     )
     facts = {

@@ -26,12 +26,14 @@ def main(snakemake):
         step_m=step_m,
     )
     meshes.write_ply(output.leaves, scene.leaves, cloud.origin_m)
+    meshes.write_ply(output.wood, scene.wood, cloud.origin_m)
     meshes.write_ply(output.terrain, terrain, cloud.origin_m)
     with atomic(output.table) as partial:
         scene.table.to_csv(partial, index=False, float_format="%.6g")
     summary = {"world_origin_m": cloud.origin_m, "crs": dem.crs} | scene.facts
     json.write(output.summary, summary)
-    centres_m = scene.leaves.vertices_m.reshape(-1, 4, 3).mean(axis=1)
+    plants = meshes.concatenate([scene.leaves, scene.wood])
+    centres_m = plants.vertices_m.reshape(-1, 4, 3).mean(axis=1)
     picture = figure.crowns(
         rasters.read(inputs.chm), labels, cloud.world_xyz_m, centres_m + cloud.origin_m, SLICE_M
     )

@@ -3,29 +3,31 @@
 import time
 
 import numpy as np
-import pandas as pd
 
 from dapple.errors import InputError
 from dapple.formats import coefficients as coefficient_files
 from dapple.formats import json, meshes, rasters
 from dapple.formats.atomic import atomic
-from dapple.optics import soil
-from dapple.retrieval import coefficients, parameters, prosail, semiless, spectra, training
+from dapple.retrieval import coefficients, prosail, semiless, spectra, training
 from dapple.workflow import options, run
 
 
 def main(snakemake):
     params, start = options(snakemake.params), time.perf_counter()
     canopy = rasters.read(snakemake.input.canopy)
-    leaves, properties = leaves_and_soils(params["leaves_and_soils"], params["seed"])
+    settings = params["leaves_and_soils"]
+    leaves, properties = spectra.combinations(
+        settings, settings["combinations"], seed=params["seed"]
+    )
     origin_m = json.read(snakemake.input.summary)["world_origin_m"]
     if params["model"] == "prosail":
         chunks, mask, pixel_m = level_canopies(
             snakemake.input.simulation, canopy, properties, origin_m, params
         )
     else:
-        chunks, window = images(snakemake.input.simulation, properties, params)
-        check_window(window, canopy, origin_m, snakemake.input.simulation)
+        (path,) = snakemake.input.simulation
+        chunks, window = images(path, properties, params)
+        check_window(window, canopy, origin_m, path)
         mask, pixel_m = canopy.values[0] > 0, canopy.pixel_m
     selection = params["selection"]
     over = training.cells(mask.shape, pixel_m=pixel_m, cell_m=selection["cell_m"])
@@ -46,20 +48,6 @@ def main(snakemake):
     print(f"{time.perf_counter() - start:.1f} s")
 
 
-def leaves_and_soils(settings, seed) -> tuple[pd.DataFrame, spectra.Spectra]:
-    """Combinations of leaf and soil, and their spectra."""
-    drawn = parameters.draw(
-        settings["combinations"],
-        seed=seed,
-        table={name: parameters.Range(*row) for name, row in settings["ranges"].items()},
-        jitter_steps=settings["jitter_steps"],
-        chlorophyll_per_carotenoid=settings["chlorophyll_per_carotenoid"],
-        water_cm=settings["water_cm"],
-    )
-    model = soil.choose(settings["soil_vectors"])
-    return drawn, spectra.spectra(drawn, model, prospect_version=settings["prospect_version"])
-
-
 def images(path, properties, params):
     """Chunks of pixels of images by three-dimensional transport, and their grid."""
     light = params["light"]
@@ -74,12 +62,13 @@ def images(path, properties, params):
     return chunks, traced.window
 
 
-def level_canopies(path, canopy, properties, origin_m, params):
+def level_canopies(paths, canopy, properties, origin_m, params):
     """SAIL of every cell with plants and canopy pixels, as pixels as large as cells."""
     cell_m = params["selection"]["cell_m"]
     over = training.cells(canopy.values.shape[1:], pixel_m=canopy.pixel_m, cell_m=cell_m)
+    plants = meshes.concatenate([meshes.read_ply(path) for path in paths])
     index = prosail.plant_area_index(
-        meshes.read_ply(path), left_m=canopy.left_m - origin_m[0], top_m=canopy.top_m - origin_m[1],
+        plants, left_m=canopy.left_m - origin_m[0], top_m=canopy.top_m - origin_m[1],
         cell_m=cell_m, shape=over.shape,
     )  # fmt: skip
     number = np.bincount(over.of_pixel, canopy.values[0].ravel() > 0, index.size)

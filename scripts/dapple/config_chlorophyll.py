@@ -39,6 +39,11 @@ class Plot(Section):
         "SPECTRL2 (Bird and Riordan 1986), aerosol optical depth 0.1 at 500 nm",
     )
     pixel_m: Positive = _(0.04, "of the images", ZHAO)
+    shoot_recollision: Annotated[float, Ge(0), Lt(1)] = _(
+        0.0,
+        "chance that light scattered by a needle meets its own shoot; rays in the virtual shoots",
+        "Smolander and Stenberg 2003: 0.47 in Scots pine",
+    )
     field_trees: Count = _(28, "trees with measured chlorophyll", ZHAO)
 
 
@@ -135,6 +140,9 @@ class Crowns(Section):
     clumping_index: Annotated[float, Gt(0), Le(1)] = _(
         1.0, "effective over true plant area within a part: needles in shoots; 1: not corrected"
     )
+    wood_share: Share = _(
+        0.15, "of the plant area, which pulses cannot tell from leaves", "Gower et al. 1999"
+    )
     facet_area_m2: Positive = _(0.01, "square facets that fill sub-crowns", ZHAO)
     terrain_step_m: Positive = _(1.0, "edge of the terrain's squares")
 
@@ -149,7 +157,11 @@ class Images(Section):
         32, "functions of the kind of path kept per pixel, for sun and sky each"
     )
     max_orders: Annotated[int, Ge(2), Le(250)] = _(100, "most surfaces on a path")
-    bark_reflectance: Share = _(0.2, "of wood, if the scene has any")
+    bark_reflectance: tuple[Share, Share, Share, Share, Share] = _(
+        (0.115, 0.132, 0.157, 0.197, 0.278),
+        "of wood, in the five bands; Semi-LESS takes their mean",
+        "larch branches in the spectral database of LESS",
+    )
     absorption_levels: Annotated[int, Ge(4), Le(100)] = _(14, "Semi-LESS: leaves to fit to", ZHAO)
     leaf_structure: Annotated[float, Ge(1), Le(3)] = _(1.5, "Semi-LESS: N of these leaves", ZHAO)
     degree: Annotated[int, Ge(1), Le(12)] = _(6, "Semi-LESS: polynomials of the leaf albedo")
@@ -225,7 +237,7 @@ class Chlorophyll(Section):
     enabled: bool = _(False, "map leaf chlorophyll instead of light")
     plots: tuple[Literal["larch", "spruce", "user"], ...] = _(("larch", "spruce"), "plots to map")
     margin_m: NotNegative = _(10.0, "surroundings of a plot that shade it")
-    larch: Plot = Plot()
+    larch: Plot = Plot(shoot_recollision=0.06)
     spruce: Plot = Plot(
         size_m=(20.0, 30.0),
         cover=0.42,
@@ -241,6 +253,7 @@ class Chlorophyll(Section):
         sun_zenith_deg=38.53,
         sun_azimuth_deg=242.81,
         pixel_m=0.026,
+        shoot_recollision=0.23,
         field_trees=17,
     )
     user: Plot = Plot()

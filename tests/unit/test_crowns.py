@@ -182,14 +182,14 @@ def raster(values, bands):
     return Raster(values, 500_000.0, 5_300_012.0, 0.25, "EPSG:25832", bands)
 
 
-def scene(cloud):
+def scene(cloud, wood_share=0.0):
     inside = np.zeros((48, 48))
     inside[8:40, 8:40] = 1
     labels = raster([np.where(inside, 1, np.nan)] * 2, ("crown", "sub_crown"))
     return crown_scene.fill(
         cloud, labels, raster(np.zeros((1, 48, 48)), ("elevation_m",)),
         n_layers=3, base_share=0.0, min_height_m=0.5, voxel_m=0.2, alpha_m=0.8, alpha_spacings=0.0,
-        clumping_index=1.0, facet_area_m2=0.01, seed=1,
+        clumping_index=1.0, wood_share=wood_share, facet_area_m2=0.01, seed=1,
         pulse_options={
             "window_s": 0.5, "range_exponent": 2.0, "ground_to_canopy_intensity": 0.0,
             "projection": 0.5, "max_density_m2_m3": 8.0,
@@ -230,3 +230,13 @@ def test_outlines_run_between_crowns_and_around_them_but_not_along_the_map():
     edge = crowns.outlines(labels)
     assert edge[:, 2:4].all()
     assert not edge[:, [0, 1, 4, 5]].any()
+
+
+def test_a_share_of_the_facets_is_wood_and_none_is_lost():
+    cloud = flight(n=3000)[0]
+    pure, mixed = scene(cloud), scene(cloud, wood_share=0.15)
+    assert pure.wood.n_elements == 0
+    n = pure.leaves.n_elements
+    assert mixed.leaves.n_elements + mixed.wood.n_elements == n
+    # A binomial draw: four standard deviations.
+    assert mixed.wood.n_elements == pytest.approx(0.15 * n, abs=4 * np.sqrt(0.15 * 0.85 * n))

@@ -30,14 +30,17 @@ def read(leaves: Sequence[str], wood: str, ground_z_m: float = 0.0) -> list[Scen
     return scenes
 
 
-def read_plot(leaves: str, terrain: str) -> Scene:
+def read_plot(leaves: str, wood: str, terrain: str) -> Scene:
     """Put together a plot: facets over terrain, and flat ground at its lowest point around it.
 
     Parameters
     ----------
-    leaves, terrain : path
+    leaves, wood, terrain : path
         PLY meshes in one local frame.
     """
-    ground = meshes.read_ply(terrain)
-    lowest = float(ground.vertices_m[:, 2].min())
-    return Scene({"leaf": meshes.read_ply(leaves), "ground": ground}, ground_z_m=lowest)
+    kinds = {"leaf": leaves, "wood": wood, "ground": terrain}
+    found = {kind: meshes.read_ply(path) for kind, path in kinds.items()}
+    lowest = float(found["ground"].vertices_m[:, 2].min())
+    # Mitsuba takes no mesh without triangles.
+    some = {kind: mesh for kind, mesh in found.items() if mesh.n_elements}
+    return Scene(some, ground_z_m=lowest)

@@ -11,14 +11,14 @@ SPHERICAL_MEAN_ANGLE_DEG = 57.0
 
 
 def plant_area_index(
-    leaves: Mesh, *, left_m: float, top_m: float, cell_m: float, shape: tuple[int, int]
+    plants: Mesh, *, left_m: float, top_m: float, cell_m: float, shape: tuple[int, int]
 ) -> np.ndarray:
     """Area of facets over the area of their cell.
 
     Parameters
     ----------
-    leaves : Mesh
-        Facets, in the frame of `left_m` and `top_m`.
+    plants : Mesh
+        Facets of leaf and wood, in the frame of `left_m` and `top_m`.
     left_m, top_m : float
         Outer north-west corner of the cells [m].
     cell_m : float
@@ -31,12 +31,12 @@ def plant_area_index(
     (rows, columns) float64
         One-sided plant area per ground area [m² m⁻²].
     """
-    centre = leaves.vertices_m[leaves.faces].mean(axis=1)
+    centre = plants.vertices_m[plants.faces].mean(axis=1)
     row = np.floor((top_m - centre[:, 1]) / cell_m).astype(np.int64)
     column = np.floor((centre[:, 0] - left_m) / cell_m).astype(np.int64)
     inside = (row >= 0) & (row < shape[0]) & (column >= 0) & (column < shape[1])
     cell = row[inside] * shape[1] + column[inside]
-    area = np.bincount(cell, leaves.triangle_area_m2[inside], shape[0] * shape[1])
+    area = np.bincount(cell, plants.triangle_area_m2[inside], shape[0] * shape[1])
     return area.reshape(shape) / cell_m**2
 
 

@@ -118,7 +118,7 @@ def fit(
     degree : int
         Of the polynomials, below n_levels.
     bark : float
-        Reflectance of bark, the same in every band.
+        Reflectance of bark, the same in every band: the published terms know only the leaf's.
     soils : four floats
         Ascending; the first is 0.
     pixels_per_chunk : int

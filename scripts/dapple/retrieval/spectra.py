@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 
 from dapple.optics.leaf import LEAF_RANGES, camera_leaves
-from dapple.optics.soil import Soil
+from dapple.optics.soil import Soil, choose
+from dapple.retrieval import parameters
 
 
 @dataclass(frozen=True)
@@ -21,25 +22,98 @@ class Spectra:
         return len(self.leaf_reflectance)
 
 
-def spectra(parameters: pd.DataFrame, soil: Soil, *, prospect_version: str = "D") -> Spectra:
+def combinations(
+    settings: dict, number: int, *, seed: int, **fixed: float
+) -> tuple[pd.DataFrame, Spectra]:
+    """Draw combinations of leaf and soil, and compute their spectra.
+
+    Parameters
+    ----------
+    settings : dict
+        `ranges` (least, most and levels by parameter), `jitter_steps`,
+        `chlorophyll_per_carotenoid`, `water_cm`, `soil_vectors`, `prospect_version` and
+        `shoot_recollision`.
+    number : int
+        How many.
+    seed : int
+    **fixed : float
+        Parameters that do not vary.
+
+    Returns
+    -------
+    parameters : DataFrame
+        See `parameters.draw`.
+    spectra : Spectra
+    """
+    ranges = settings["ranges"] | {name: (value, value, 1) for name, value in fixed.items()}
+    drawn = parameters.draw(
+        number,
+        seed=seed,
+        table={name: parameters.Range(*row) for name, row in ranges.items()},
+        jitter_steps=settings["jitter_steps"],
+        chlorophyll_per_carotenoid=settings["chlorophyll_per_carotenoid"],
+        water_cm=settings["water_cm"],
+    )
+    return drawn, spectra(
+        drawn,
+        choose(settings["soil_vectors"]),
+        prospect_version=settings["prospect_version"],
+        shoot_recollision=settings["shoot_recollision"],
+    )
+
+
+def spectra(
+    drawn: pd.DataFrame,
+    soil: Soil,
+    *,
+    prospect_version: str = "D",
+    shoot_recollision: float = 0.0,
+) -> Spectra:
     """Optical properties of every combination.
 
     Parameters
     ----------
-    parameters : DataFrame
+    drawn : DataFrame
         From `parameters.draw`: PROSPECT's arguments, `soil_brightness`, `soil_moisture`.
     soil : callable
         From `optics.soil`: brightness and moisture (n,) to reflectance (n, b).
     prospect_version : {"5", "D"}
         Calibration of PROSPECT.
+    shoot_recollision : float
+        See `of_shoots`; 0: single leaves.
 
     Returns
     -------
     Spectra
     """
-    leaf = {name: parameters[name].to_numpy(float) for name in LEAF_RANGES if name in parameters}
+    leaf = {name: drawn[name].to_numpy(float) for name in LEAF_RANGES if name in drawn}
     reflectance, transmittance = camera_leaves(**leaf, prospect_version=prospect_version)
-    ground = soil(
-        parameters["soil_brightness"].to_numpy(float), parameters["soil_moisture"].to_numpy(float)
-    )
+    reflectance, transmittance = of_shoots(reflectance, transmittance, shoot_recollision)
+    ground = soil(drawn["soil_brightness"].to_numpy(float), drawn["soil_moisture"].to_numpy(float))
     return Spectra(reflectance, transmittance, ground)
+
+
+def of_shoots(
+    reflectance: np.ndarray, transmittance: np.ndarray, recollision: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Optical properties of shoots whose needles light meets again before it leaves them.
+
+    With the chance p that light scattered by a needle meets its own shoot, a shoot scatters
+    w (1 - p) / (1 - p w) of what it intercepts, where its needles scatter w = ρ + τ (Smolander and
+    Stenberg 2003). Reflectance keeps its share.
+
+    Parameters
+    ----------
+    reflectance, transmittance : (...) float
+        Of needles, 0 to 1.
+    recollision : float
+        The chance p, from 0 to below 1.
+
+    Returns
+    -------
+    reflectance, transmittance : (...) float
+        Of a surface that stands for the shoot.
+    """
+    albedo = np.asarray(reflectance) + transmittance
+    left = (1 - recollision) / (1 - recollision * albedo)
+    return reflectance * left, transmittance * left

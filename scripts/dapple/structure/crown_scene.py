@@ -19,18 +19,19 @@ class CrownScene:
 
     Attributes
     ----------
-    leaves : Mesh
+    leaves, wood : Mesh
         Square facets, local frame.
     table : DataFrame
         One row a part: `subcrown`, `crown`, `layer` (1 is the lowest), `volume_m3`,
         `plant_area_index` (of the sub-crown's area on the map), `plant_area_density_m2_m3`,
-        `leaf_area_m2` (with wood: a pulse cannot tell), `n_facets`, `known` (False: density of
-        the neighbours).
+        `leaf_area_m2` (with wood: a pulse cannot tell), `n_facets` (of both), `known`
+        (False: density of the neighbours).
     facts : dict
         Totals, and how pulses and their light were found.
     """
 
     leaves: Mesh
+    wood: Mesh
     table: pd.DataFrame
     facts: dict
 
@@ -47,6 +48,7 @@ def fill(
     alpha_m: float,
     alpha_spacings: float,
     clumping_index: float,
+    wood_share: float,
     facet_area_m2: float,
     pulse_options: dict,
     seed: int,
@@ -68,6 +70,8 @@ def fill(
         The alpha shapes' radius is at least so many mean distances of the cloud's points.
     clumping_index : float
         Effective over true plant area within a part.
+    wood_share : float
+        Of the plant area.
     facet_area_m2 : float
     pulse_options : dict
         Keywords of `plant_area_density`.
@@ -106,9 +110,10 @@ def fill(
     table, volume = division.table(), parts.part_volume_m3
     filled = filled_crowns.fill_unknown(density / clumping_index, volume, table)
     counts = facets.numbers(filled * volume, facet_area_m2)
-    leaves = filled_crowns.facet_mesh(
-        parts, counts, facet_area_m2=facet_area_m2, rng=np.random.default_rng(seed)
-    )
+    leaves, wood = filled_crowns.facet_meshes(
+        parts, counts, wood_share=wood_share, facet_area_m2=facet_area_m2,
+        rng=np.random.default_rng(seed),
+    )  # fmt: skip
     table = table.assign(
         volume_m3=volume,
         plant_area_index=filled * volume / np.repeat(division.area_m2(), n_layers),
@@ -120,7 +125,7 @@ def fill(
     above = (height_m >= min_height_m).sum()
     facts = _totals(table, division, dem) | facts | {"alpha_m": alpha_m}
     return CrownScene(
-        leaves, table, facts | {"returns_in_crowns_share": float((part >= 0).sum() / above)}
+        leaves, wood, table, facts | {"returns_in_crowns_share": float((part >= 0).sum() / above)}
     )
 
 

@@ -202,14 +202,39 @@ def fill_unknown(
     return np.nan_to_num(filled)
 
 
-def facet_mesh(
-    parts: Parts, counts: np.ndarray, *, facet_area_m2: float, rng: np.random.Generator
-) -> Mesh:
-    """Fill parts with random squares, `counts` (p,) in each, uniform over its volume."""
+def facet_meshes(
+    parts: Parts,
+    counts: np.ndarray,
+    *,
+    wood_share: float,
+    facet_area_m2: float,
+    rng: np.random.Generator,
+) -> tuple[Mesh, Mesh]:
+    """Fill parts with random squares of leaf and wood, uniform over their volume.
+
+    Parameters
+    ----------
+    parts : Parts
+    counts : (p,) int
+        Squares of each part.
+    wood_share : float
+        Chance of a square to be wood, 0 to 1: pulses cannot tell twigs from leaves.
+    facet_area_m2 : float
+    rng : Generator
+
+    Returns
+    -------
+    leaves, wood : Mesh
+    """
     centres = [
         alpha_shapes.sample(parts.corners_m[a:b], parts.volumes_m3[a:b], int(n), rng)
         for a, b, n in zip(parts.first[:-1], parts.first[1:], counts, strict=True)
         if n
     ]
     centre = np.concatenate(centres) if centres else np.zeros((0, 3))
-    return facets.squares(centre, facet_area_m2=facet_area_m2, rng=rng)
+    is_wood = rng.random(len(centre)) < wood_share
+    leaves, wood = (
+        facets.squares(centre[chosen], facet_area_m2=facet_area_m2, rng=rng)
+        for chosen in (~is_wood, is_wood)
+    )
+    return leaves, wood
