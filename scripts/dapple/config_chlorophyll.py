@@ -186,7 +186,7 @@ class Retrieval(Section):
     sunlit_nir: Share = _(0.25, "near-infrared reflectance above which a pixel is sunlit", ZHAO)
     canopy_height_m: NotNegative = _(2.0, "least height of vegetation that counts as canopy")
     min_share: Share = _(0.02, "chosen pixels that a map pixel must have, as a share of it")
-    combinations: Annotated[int, Ge(10)] = _(1200, "combinations of leaf and soil")
+    combinations: Annotated[int, Ge(10)] = _(1400, "combinations of leaf and soil")
     max_entries: Count = _(200_000, "entries kept of more, drawn by chance; 182,560 published")
     n: GridRange = _((1.0, 2.5, 4), "leaf structure: least, most, levels of the grid", ZHAO)
     chlorophyll_ug_cm2: GridRange = _((10.0, 70.0, 13), "chlorophyll a and b per leaf area", ZHAO)
