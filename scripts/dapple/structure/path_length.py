@@ -200,8 +200,11 @@ def _limits(corner, size, shape, start, direction):
 
 
 @njit(cache=True)
-def _walk(part, corner, size, start, direction, t_in, t_out, runs_part, runs_in, runs_out):
+def _walk(part, corner, size, start, direction, runs_part, runs_in, runs_out):
     """Stretches of a line inside of parts; returns how many."""
+    t_in, t_out = _limits(corner, size, part.shape, start, direction)
+    if t_in >= t_out:
+        return 0
     index, step = np.empty(3, np.int64), np.empty(3, np.int64)
     t_next, t_step = np.empty(3), np.empty(3)
     for axis in range(3):
@@ -248,21 +251,8 @@ def _longest(part, corner, size, start, direction):
         runs_part = np.empty(256, np.int64)
         runs_in, runs_out = np.empty(256), np.empty(256)
         for i in range(n * group // N_SHARES, n * (group + 1) // N_SHARES):
-            t_in, t_out = _limits(corner, size, part.shape, start[i], direction[i])
-            if t_in >= t_out:
-                continue
-            runs = _walk(
-                part,
-                corner,
-                size,
-                start[i],
-                direction[i],
-                t_in,
-                t_out,
-                runs_part,
-                runs_in,
-                runs_out,
-            )
+            line = start[i], direction[i]
+            runs = _walk(part, corner, size, *line, runs_part, runs_in, runs_out)
             for k in range(runs):
                 result[group] = max(result[group], runs_out[k] - runs_in[k])
     return result.max()
@@ -280,21 +270,8 @@ def _trace(
         runs_part = np.empty(256, np.int64)
         runs_in, runs_out = np.empty(256), np.empty(256)
         for i in range(n * group // N_SHARES, n * (group + 1) // N_SHARES):
-            t_in, t_out = _limits(corner, size, part.shape, start[i], direction[i])
-            if t_in >= t_out:
-                continue
-            runs = _walk(
-                part,
-                corner,
-                size,
-                start[i],
-                direction[i],
-                t_in,
-                t_out,
-                runs_part,
-                runs_in,
-                runs_out,
-            )
+            line = start[i], direction[i]
+            runs = _walk(part, corner, size, *line, runs_part, runs_in, runs_out)
             light, at = 1.0, first[i]
             for k in range(runs):
                 while at < first[i + 1] and distance[at] < runs_in[k]:
