@@ -17,6 +17,8 @@ STABILITY_BASE = (
 # Finer scans and needles fill memory; what they need was measured.
 STABILITY_LARGE = {"angular_step": 9000, "leaf_size": 5000}
 
+WORSENED = [name for name in COMPARED if name != "truth"]
+
 if STABILITY.enabled:
     from dapple.light.series import DIRECT_SHARE
     from dapple.stability import stressors as dapple_stressors
