@@ -1,13 +1,14 @@
 """
 Stability: where methods fail.
 
-Needs   the configuration
+Needs   the configuration; for stability/records.csv light/, structure/, sky/ and statistics/records.csv
 Makes   stability/base/{world}/           a world, its undisturbed scan and run, shared by batches
         stability/batches/                one table a stressor and world: all its levels
         stability/points.csv              all runs: agreement with the truth, signals, verdict
         stability/thresholds.csv          from which level on a method has failed
         stability/published.csv           where the published findings hold in these worlds
         stability/map.png, curves.png     by stressor, level and method
+        stability/records.csv             a run's own records made worse; not part of a plain run
 """
 
 
@@ -119,3 +120,45 @@ rule stability_figures:
         "{settings.experiment}: map and curves"
     script:
         "../scripts/stability_figures.py"
+
+
+if WORSENED:
+
+    rule stability_records:
+        input:
+            records=results("statistics/records.csv"),
+            light=[results(f"light/{name}.nc") for name in WORSENED],
+            leaves=leaf_meshes("polygons") if "polygons" in WORSENED else [],
+            wood=results("structure/polygons/wood.ply"),
+            voxels=[
+                results(f"structure/{name}/voxels.nc")
+                for name in WORSENED
+                if name.startswith("voxels_")
+            ],
+            sky=results("sky/sky.nc"),
+            sensors=results("sky/sensors.csv"),
+            code=code("stability_records"),
+        output:
+            records=results("stability/records.csv"),
+        log:
+            logs("stability_records"),
+        benchmark:
+            benchmarks("stability_records")
+        conda:
+            "../envs/dapple.yaml"
+        threads: 2
+        resources:
+            mem_mb=4000,
+        params:
+            methods=WORSENED,
+            levels=STABILITY.levels,
+            seeds=STABILITY.seeds,
+            ground_z_m=settings.ground_z_m,
+            variant=f"{VARIANT}_mono",
+            sun_diameter_deg=settings.light.sun_diameter_deg,
+            aperture_m=settings.light.aperture_m,
+            seed=stream("stability_records"),
+        message:
+            "{settings.experiment}: its own records made worse"
+        script:
+            "../scripts/stability_records.py"

@@ -8,7 +8,7 @@ import xarray as xr
 
 from dapple.formats import clouds, json, light, meshes, scenes, shots, voxels
 from dapple.formats.clouds import LEAF
-from dapple.light import sensors
+from dapple.light import sensors, traced
 from dapple.stability import signals, verdict
 from dapple.stability.evidence import Evidence, count_points, no_mesh
 from dapple.stability.sensitivity import moved_light
@@ -64,14 +64,13 @@ def _lit(inputs, params):
         name = Path(path).stem
         lit[name] = light.read(path).isel(time=at)
         grid = [file for file in inputs.voxels if Path(file).parent.name == name]
-        scene = scenes.read(grid or inputs.leaves, inputs.wood, params.ground_z_m)
+        found = scenes.read(grid or inputs.leaves, inputs.wood, params.ground_z_m)
         moved[name] = moved_light(
-            scene,
+            (traced.load(scene, params.variant) for scene in found),
             places,
             lit[name],
             sky,
             shift_m=SHIFT_M,
-            variant=params.variant,
             seed=params.seed,
             sun_diameter_deg=params.sun_diameter_deg,
             aperture_m=params.aperture_m,

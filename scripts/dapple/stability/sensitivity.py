@@ -5,19 +5,18 @@ from collections.abc import Iterable
 import numpy as np
 import xarray as xr
 
-from dapple.light import direct, traced
-from dapple.light.scene import Scene
+from dapple.light import direct
 from dapple.light.series import level_beam, towards_sun
+from dapple.light.traced import TracedScene
 
 
 def moved_light(
-    scenes: Iterable[Scene],
+    scenes: Iterable[TracedScene],
     sensors_m: np.ndarray,
     light: xr.Dataset,
     sky: xr.Dataset,
     *,
     shift_m: float,
-    variant: str,
     seed: int,
     max_rays: int = 128,
     tolerance: float = 0.02,
@@ -30,7 +29,7 @@ def moved_light(
 
     Parameters
     ----------
-    scenes : iterable of Scene
+    scenes : iterable of TracedScene
         One a placement of leaves; their mean counts.
     sensors_m : (s, 3) float64
         Local frame [m].
@@ -40,8 +39,6 @@ def moved_light(
         Sun and sky at the same times.
     shift_m : float
         How far they are moved [m].
-    variant : str
-        Of Mitsuba.
     seed : int
         Chooses the directions and shifts the rays.
     max_rays, tolerance, sun_diameter_deg, aperture_m
@@ -57,7 +54,7 @@ def moved_light(
     places = np.concatenate([sensors_m, sensors_m + shift_m * way])
     shares = [
         direct.sunlit(
-            traced.load(scene, variant),
+            scene,
             places,
             towards_sun(sky),
             tolerance=tolerance,
