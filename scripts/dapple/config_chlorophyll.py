@@ -150,7 +150,9 @@ class Crowns(Section):
 class Images(Section):
     """Simulated images: paths, orders, the published acceleration."""
 
-    pixel_m: Positive = _(0.1, "of the simulated images")
+    pixel_m: Positive = _(
+        0.25, "of the simulated images: wider than facets, or chance tilts tell what is sunlit"
+    )
     paths_per_pixel: Annotated[int, Ge(4), Le(65536)] = _(64, "light paths, at least")
     least_paths: Count = _(16_000_000, "of a whole image: a small plot gets more per pixel")
     columns: Annotated[int, Ge(4), Le(200)] = _(
@@ -169,7 +171,7 @@ class Images(Section):
         (0.2, 0.5, 0.8), "Semi-LESS: reflectance of three soils beside a black one"
     )
     direct_renders: Annotated[int, Ge(2)] = _(30, "combinations rendered one by one, to compare")
-    direct_paths: Annotated[int, Ge(2)] = _(16, "paths per pixel of such a render")
+    direct_paths: Annotated[int, Ge(2)] = _(32, "paths per pixel of such a render")
     speed_combinations: Count = _(1000, "combinations for which times are compared", ZHAO)
 
 
