@@ -126,6 +126,7 @@ LEAVES_AND_SOILS = {
     "combinations": RETRIEVAL.combinations,
     "jitter_steps": RETRIEVAL.jitter_steps,
     "chlorophyll_per_carotenoid": RETRIEVAL.chlorophyll_per_carotenoid,
+    "anthocyanin_per_chlorophyll": RETRIEVAL.anthocyanin_per_chlorophyll,
     "water_cm": RETRIEVAL.water_cm,
     "prospect_version": RETRIEVAL.prospect_version,
     "soil_vectors": RETRIEVAL.soil_vectors

@@ -193,6 +193,11 @@ class Retrieval(Section):
     n: GridRange = _((1.0, 2.5, 4), "leaf structure: least, most, levels of the grid", ZHAO)
     chlorophyll_ug_cm2: GridRange = _((10.0, 70.0, 13), "chlorophyll a and b per leaf area", ZHAO)
     chlorophyll_per_carotenoid: Positive = _(4.0, "carotenoids follow from chlorophyll", ZHAO)
+    anthocyanin_per_chlorophyll: NotNegative = _(
+        0.043,
+        "PROSPECT-D: what green leaves hold; PROSPECT-5 counts it as chlorophyll",
+        "larch and birch leaves in the spectral database of LESS",
+    )
     dry_matter_g_cm2: GridRange = _((0.0, 0.03, 4), "dry matter per leaf area", ZHAO)
     water_cm: NotNegative = _(0.015, "equivalent water thickness", ZHAO)
     brown: GridRange = _((0.0, 0.8, 5), "brown pigments", ZHAO)

@@ -35,11 +35,12 @@ def test_the_jitter_is_gaussian_with_half_a_step_and_cut_off_at_the_bounds():
     assert len(near) / n == pytest.approx((0.3829 + 2 * 0.0606) / 3, abs=0.01)
 
 
-def test_parameters_do_not_depend_on_each_other_but_carotenoids_follow_chlorophyll():
+def test_parameters_do_not_depend_on_each_other_but_other_pigments_follow_chlorophyll():
     drawn = parameters.draw(4000, seed=4)
     correlation = drawn[list(TABLE)].corr().to_numpy() - np.eye(len(TABLE))
     assert np.abs(correlation).max() < 4.5 / 4000**0.5
     assert (drawn["carotenoids_ug_cm2"] * 4 - drawn["chlorophyll_ug_cm2"]).abs().max() < 1e-9
+    assert (drawn["anthocyanin_ug_cm2"] / drawn["chlorophyll_ug_cm2"] - 0.043).abs().max() < 1e-9
     assert (drawn["water_cm"] == 0.015).all()
 
 

@@ -31,8 +31,8 @@ def combinations(
     ----------
     settings : dict
         `ranges` (least, most and levels by parameter), `jitter_steps`,
-        `chlorophyll_per_carotenoid`, `water_cm`, `soil_vectors`, `prospect_version` and
-        `shoot_recollision`.
+        `chlorophyll_per_carotenoid`, `anthocyanin_per_chlorophyll`, `water_cm`, `soil_vectors`,
+        `prospect_version` and `shoot_recollision`.
     number : int
         How many.
     seed : int
@@ -52,6 +52,7 @@ def combinations(
         table={name: parameters.Range(*row) for name, row in ranges.items()},
         jitter_steps=settings["jitter_steps"],
         chlorophyll_per_carotenoid=settings["chlorophyll_per_carotenoid"],
+        anthocyanin_per_chlorophyll=settings["anthocyanin_per_chlorophyll"],
         water_cm=settings["water_cm"],
     )
     return drawn, spectra(
@@ -78,7 +79,7 @@ def spectra(
     soil : callable
         From `optics.soil`: brightness and moisture (n,) to reflectance (n, b).
     prospect_version : {"5", "D"}
-        Calibration of PROSPECT.
+        Calibration of PROSPECT. To "5" the anthocyanin of green leaves is part of chlorophyll.
     shoot_recollision : float
         See `of_shoots`; 0: single leaves.
 
@@ -87,6 +88,8 @@ def spectra(
     Spectra
     """
     leaf = {name: drawn[name].to_numpy(float) for name in LEAF_RANGES if name in drawn}
+    if prospect_version == "5":
+        leaf["anthocyanin_ug_cm2"] = 0.0
     reflectance, transmittance = camera_leaves(**leaf, prospect_version=prospect_version)
     reflectance, transmittance = of_shoots(reflectance, transmittance, shoot_recollision)
     ground = soil(drawn["soil_brightness"].to_numpy(float), drawn["soil_moisture"].to_numpy(float))
