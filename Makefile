@@ -25,7 +25,7 @@ format: setup
 	$(BIN)/snakefmt Snakefile rules
 
 docs: setup
-	PYTHONPATH=scripts $(BIN)/python -m dapple.config_docs
+	PYTHONPATH=scripts $(BIN)/python -m dapple.config.docs
 
 lock: setup
 	$(BIN)/uv pip compile pyproject.toml --group dev --generate-hashes --universal --no-header --quiet -o requirements.lock

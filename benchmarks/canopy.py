@@ -14,13 +14,13 @@ import yaml
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
-from dapple.config import Settings
-from dapple.formats import json, rasters, scenes
+from dapple.config.settings import Settings
+from dapple.formats import json, rasters
 from dapple.formats.meshes import concatenate
 from dapple.frames import direction_from_angles
-from dapple.light import traced
-from dapple.light.scene import Scene
-from dapple.retrieval import coefficients, image_paths, maps, spectra, training
+from dapple.retrieval import coefficients, image_paths, maps, spectra, training_entries
+from dapple.scene import scene_files, traced
+from dapple.scene.surfaces import Scene
 from dapple.virtual import plot_optics
 
 EDGE_M = 18.0
@@ -40,7 +40,7 @@ def ratios(folder: Path, name: str) -> pd.DataFrame:
     settings = Settings(**yaml.safe_load((folder / "config.yaml").read_text())).chlorophyll
     plot, path = getattr(settings, name), folder / "plots" / name
     origin_m = json.read(path / "scene/summary.json")["world_origin_m"]
-    scene = scenes.read_plot(
+    scene = scene_files.read_plot(
         *(path / f"scene/{part}.ply" for part in ("leaves", "wood", "terrain"))
     )
     observed = rasters.read(path / "world/images.tif")
@@ -73,11 +73,13 @@ def ratios(folder: Path, name: str) -> pd.DataFrame:
         canopy = maps.canopy(
             maps.sample(heights, **grid)[0], min_height_m=settings.retrieval.canopy_height_m
         )
-        for mask in training.MASKS:
-            chosen = [training.select(x, canopy, mask=mask) for x in (seen, image)]
+        for mask in training_entries.MASKS:
+            chosen = [training_entries.select(x, canopy, mask=mask) for x in (seen, image)]
             value = seen[:, chosen[0]].mean(axis=1) / image[:, chosen[1]].mean(axis=1)
             rows.append((wood, shoots, pixel_m, mask, *value))
-    return pd.DataFrame(rows, columns=["wood", "shoots", "pixel_m", "mask", *training.BANDS])
+    return pd.DataFrame(
+        rows, columns=["wood", "shoots", "pixel_m", "mask", *training_entries.BANDS]
+    )
 
 
 def truth(world, trees: pd.DataFrame):

@@ -16,16 +16,17 @@ import yaml
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
-from dapple.config import Settings, validate
-from dapple.formats import json, light, meshes
-from dapple.light import direct, measured, sensors, series, traced, transport
-from dapple.light.scene import Scene
-from dapple.light.sky import sky_dataset
-from dapple.light.sun import Site, broadband
-from dapple.light.times import time_range
-from dapple.stats import correlation
-from dapple.stats.records import pair
+from dapple.config.settings import Settings, validate
+from dapple.formats import json, meshes, netcdf
+from dapple.light import series, transport, visibility
+from dapple.scene import sensors, traced
+from dapple.scene.surfaces import Scene
+from dapple.sky.sky_radiance import sky_dataset
+from dapple.sky.sun import Site, broadband
+from dapple.stats import correlation, measured
+from dapple.stats.pairs import pair
 from dapple.streams import stream_seed
+from dapple.times import time_range
 from dapple.virtual.leaves import along_wood
 
 EFFORT = {"n_paths": 2048, "n_sky_rays": 4096, "max_orders": 12, "n_patches": 577}
@@ -66,7 +67,7 @@ class Run:
     def __init__(self, folder: Path, step_min: float):
         self.settings: Settings = validate(yaml.safe_load((folder / "config.yaml").read_text()))
         self.registration = json.read(folder / "registration/registration.json")
-        self.optics = light.read_optics(folder / "sky/optics.nc")
+        self.optics = netcdf.read_optics(folder / "sky/optics.nc")
         table = sensors.read_local(folder / "sky/sensors.csv")
         records = measured.read(Path(self.settings.data_dir) / self.settings.measured.path)
         self.records = records[~records["sensor"].isin(self.registration["fitting_sensors"])]
@@ -124,7 +125,7 @@ class Run:
         for number, one in enumerate(leaves):
             scene = Scene({"leaf": one, "wood": self.wood}, None, self.settings.ground_z_m)
             loaded = traced.load(scene)
-            seen = direct.sunlit(
+            seen = visibility.sunlit(
                 loaded, points_m, series.towards_sun(sky), tolerance=0.005, max_rays=4096,
                 sun_diameter_deg=sun_diameter_deg, seed=stream_seed(1, number),
             )  # fmt: skip

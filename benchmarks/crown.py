@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from dapple.formats.light import time_coordinate
 from dapple.formats.meshes import Mesh
-from dapple.light.scene import Optics, Scene
+from dapple.formats.netcdf import time_coordinate
+from dapple.scene.surfaces import Optics, Scene
 
 CENTRE_M, RADII_M = np.array([0.0, 0.0, 4.4]), np.array([3.8, 3.8, 2.3])
 LEAF_AREA_M2 = 187.0

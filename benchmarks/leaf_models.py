@@ -15,9 +15,9 @@ import yaml
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
-from dapple.config import Settings
-from dapple.formats import json, polygons, rasters
-from dapple.retrieval import evaluation, network, spectra, training
+from dapple.config.settings import Settings
+from dapple.formats import geojson, json, rasters
+from dapple.retrieval import evaluation, network, spectra, training_entries
 from dapple.retrieval.noise import Noise
 from training_set import images, level_canopies
 
@@ -92,14 +92,14 @@ def entries(settings, path: Path, name: str, changed: dict, model: str) -> pd.Da
     else:
         chunks, _ = images(files[0], properties, params)
         mask, pixel_m = canopy.values[0] > 0, canopy.pixel_m
-    over = training.cells(mask.shape, pixel_m=pixel_m, cell_m=retrieval.map_pixel_m)
-    found = training.aggregate(chunks, mask, over, masks=("sunlit",))["sunlit"]
-    return training.entries(*found, drawn, max_entries=ENTRIES, seed=SEED)
+    over = training_entries.cells(mask.shape, pixel_m=pixel_m, cell_m=retrieval.map_pixel_m)
+    found = training_entries.aggregate(chunks, mask, over, masks=("sunlit",))["sunlit"]
+    return training_entries.entries(*found, drawn, max_entries=ENTRIES, seed=SEED)
 
 
 def learn(frame: pd.DataFrame, parts: dict, retrieval, *, robust: bool) -> network.Network:
     """A network, taught with or without errors in the bands."""
-    bands, target = training.features(frame), frame["chlorophyll_ug_cm2"].to_numpy()
+    bands, target = training_entries.features(frame), frame["chlorophyll_ug_cm2"].to_numpy()
     relative, absolute = retrieval.relative_noise, retrieval.absolute_noise
     net, _ = network.train(
         *(x[parts[part]] for part in ("train", "validation") for x in (bands, target)),
@@ -111,7 +111,7 @@ def learn(frame: pd.DataFrame, parts: dict, retrieval, *, robust: bool) -> netwo
 
 def test(net: network.Network, frame: pd.DataFrame) -> dict[str, float]:
     """Score on simulated entries."""
-    predicted = network.predict(net, training.features(frame))
+    predicted = network.predict(net, training_entries.features(frame))
     found = evaluation.scores(frame["chlorophyll_ug_cm2"].to_numpy(), predicted)
     return {"simulated_rmse": found["rmse"]}
 
@@ -119,8 +119,8 @@ def test(net: network.Network, frame: pd.DataFrame) -> dict[str, float]:
 def field(net: network.Network, path: Path, cell_m: float) -> dict[str, float]:
     """Score on the trees of the observed images."""
     observed = rasters.read(path / "retrieval/observed_sunlit.tif")
-    crowns = polygons.read(path / "world/crowns.geojson")
-    bands = rasters.select(observed, training.BANDS, path).values
+    crowns = geojson.read(path / "world/crowns.geojson")
+    bands = rasters.select(observed, training_entries.BANDS, path).values
     flat = bands.reshape(len(bands), -1).T
     lcc = np.where(np.isfinite(flat).all(axis=1), network.predict(net, flat), np.nan)
     table = evaluation.trees(

@@ -17,12 +17,14 @@ import yaml
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
-from dapple.config import validate
+from dapple.config.settings import validate
 from dapple.formats import json, meshes
-from dapple.light import measured, sensors, shade
-from dapple.light.scene import Scene
-from dapple.light.sky import sky_dataset
-from dapple.light.sun import Site, broadband
+from dapple.registration import shading
+from dapple.scene import sensors
+from dapple.scene.surfaces import Scene
+from dapple.sky.sky_radiance import sky_dataset
+from dapple.sky.sun import Site, broadband
+from dapple.stats import measured
 from dapple.streams import stream_seed
 from dapple.virtual.leaves import along_wood
 
@@ -60,7 +62,7 @@ def main() -> None:
         leaves = [
             along_wood(wood, **placing, seed=stream_seed(11, k)) for k in range(options.placements)
         ]
-        found = shade.register(
+        found = shading.register(
             [Scene({"leaf": one, "wood": wood}, None, settings.ground_z_m) for one in leaves],
             table,
             records,

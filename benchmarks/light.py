@@ -25,10 +25,11 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 import crown
 import rays
 
-from dapple.formats import light, meshes, scenes, voxels
-from dapple.light import direct, series, traced, transport
-from dapple.light.reference import Reference
-from dapple.light.scene import Scene
+from dapple.formats import meshes, netcdf, voxel_grids
+from dapple.light import series, transport, visibility
+from dapple.light.timestep_series import Reference
+from dapple.scene import scene_files, traced
+from dapple.scene.surfaces import Scene
 
 KINDS = ("polygons", "voxels_0.2", "voxels_1.0")
 REFERENCE_RAYS = {
@@ -46,10 +47,10 @@ def prepare(folder: Path, kind: str, n_triangles: int, n_sensors: int, n_times: 
     if scene.voxels is None:
         meshes.write_ply(folder / "leaves.ply", scene.meshes["leaf"])
     else:
-        voxels.write(folder / "leaves.nc", scene.voxels)
+        voxel_grids.write(folder / "leaves.nc", scene.voxels)
     meshes.write_ply(folder / "wood.ply", scene.meshes["wood"])
-    light.write(folder / "sky.nc", described(crown.sky(n_times)))
-    light.write_optics(folder / "optics.nc", crown.optics())
+    netcdf.write(folder / "sky.nc", described(crown.sky(n_times)))
+    netcdf.write_optics(folder / "optics.nc", crown.optics())
     np.save(folder / "sensors.npy", crown.sensors(n_sensors))
 
 
@@ -66,11 +67,11 @@ def once(folder: Path, variant: str, tolerance: float) -> dict[str, float]:
     clock, cpu = [time.perf_counter()], time.process_time()
     leaves = folder / "leaves.ply"
     leaves = leaves if leaves.exists() else folder / "leaves.nc"
-    scene = traced.load(scenes.read([leaves], folder / "wood.ply")[0], variant)
-    sky, optics = light.read(folder / "sky.nc"), light.read_optics(folder / "optics.nc")
+    scene = traced.load(scene_files.read([leaves], folder / "wood.ply")[0], variant)
+    sky, optics = netcdf.read(folder / "sky.nc"), netcdf.read_optics(folder / "optics.nc")
     sensors = np.load(folder / "sensors.npy")
     clock.append(time.perf_counter())
-    sunlit = direct.sunlit(
+    sunlit = visibility.sunlit(
         scene,
         sensors,
         series.towards_sun(sky),
@@ -93,7 +94,7 @@ def once(folder: Path, variant: str, tolerance: float) -> dict[str, float]:
     clock.append(time.perf_counter())
     result = series.compute(sunlit, counted, sky, optics, sun_kernel_deg=8.0)
     names = [f"1_{k}" for k in range(len(sensors))]
-    light.write(folder / "light.nc", series.summarise([result], names, sky))
+    netcdf.write(folder / "light.nc", series.summarise([result], names, sky))
     clock.append(time.perf_counter())
     cpu = time.process_time() - cpu
     open_sky = series.open_sky_par(sky).to_numpy()
@@ -128,7 +129,7 @@ def fresh(folder: Path, variant: str, tolerance: float) -> dict[str, float]:
 
 def against_reference(folder: Path, scene: Scene, fast: dict, variant: str, n_compared: int):
     """Time of the per-timestep engine at equal standard error, and how far both agree."""
-    sky, optics = light.read(folder / "sky.nc"), light.read_optics(folder / "optics.nc")
+    sky, optics = netcdf.read(folder / "sky.nc"), netcdf.read_optics(folder / "optics.nc")
     sensors = pd.DataFrame(np.load(folder / "sensors.npy"), columns=["x_m", "y_m", "z_m"])
     sensors.insert(0, "sensor", [f"1_{k}" for k in range(len(sensors))])
     chosen = np.linspace(0, sky.sizes["time"] - 1, n_compared).astype(int)
@@ -161,7 +162,7 @@ def against_reference(folder: Path, scene: Scene, fast: dict, variant: str, n_co
     variance = simulate(1.0)[-1]
     factor = max(variance / fast["error_of_replicates_rms"] ** 2, 1.0)
     seconds, cpu, par, error, variance = simulate(factor)
-    ours = light.read(folder / "light.nc").isel(time=chosen)
+    ours = netcdf.read(folder / "light.nc").isel(time=chosen)
     difference = ours["par_umol_m2_s"].to_numpy() / open_sky - par
     mine = ours["standard_error_umol_m2_s"].to_numpy() / open_sky
     z = difference / np.hypot(np.hypot(error, mine), 1e-6)

@@ -19,8 +19,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
 from dapple.formats import rami
 from dapple.frames import direction_from_angles
-from dapple.light import brf, direct, patterns, traced
-from dapple.light.scene import Optics, Scene
+from dapple.light import brf, patterns, visibility
+from dapple.scene import traced
+from dapple.scene.surfaces import Optics, Scene
 
 CELL_M = np.array([[-50.0, -50.0], [50.0, 50.0]])
 SUN_ZENITH_DEG, SUN_AZIMUTH_DEG = 20.0, 0.0
@@ -49,7 +50,7 @@ def gap_fraction(scene: traced.TracedScene, towards: np.ndarray, n: int = 1 << 1
     for k, shift in enumerate(np.random.default_rng(1).random((16, 1, 2))):
         square = (patterns.kronecker(n // 16, 2) + shift) % 1.0
         points = np.column_stack([CELL_M[0] + square * (CELL_M[1] - CELL_M[0]), np.zeros(n // 16)])
-        seen = direct.sunlit(
+        seen = visibility.sunlit(
             scene,
             points,
             towards[None],

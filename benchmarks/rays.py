@@ -12,8 +12,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 import crown
 
 from dapple.frames import direction_from_angles
-from dapple.light import patterns, series, shadow, traced
-from dapple.light.scene import Scene
+from dapple.light import patterns, rays_to_sky, series
+from dapple.scene import traced
+from dapple.scene.surfaces import Scene
 
 SUN_DIAMETER_DEG = 0.533
 
@@ -24,7 +25,7 @@ def shadow_rays(scene: Scene, variant: str, n_sensors: int = 72, n_times: int = 
     mi = loaded.mi
     sensors, sky = crown.sensors(n_sensors), crown.sky(n_times)
     suns, n_rays = series.towards_sun(sky), 256
-    trace = shadow.sun_rays(
+    trace = rays_to_sky.sun_rays(
         loaded, sensors, suns, sun_diameter_deg=SUN_DIAMETER_DEG, aperture_m=0.0, seed=1
     )
     pairs = np.arange(n_sensors * n_times)

@@ -22,7 +22,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 import crown
 import rays
 
-from dapple.light import direct, series, traced, transport
+from dapple.light import series, transport, visibility
+from dapple.scene import traced
 
 BASE = {"triangles": 350_000, "sensors": 72, "times": 30, "trees": 1}
 AXES = {
@@ -86,7 +87,7 @@ def run(scene: traced.TracedScene, n_sensors: int, n_times: int) -> np.ndarray:
     sensors, sky = crown.sensors(n_sensors), crown.sky(n_times)
     clock = [now()]
     suns = series.towards_sun(sky)
-    sunlit = direct.sunlit(scene, sensors, suns, tolerance=1.0, max_rays=256, seed=1)
+    sunlit = visibility.sunlit(scene, sensors, suns, tolerance=1.0, max_rays=256, seed=1)
     clock.append(now())
     counted = transport.collect(scene, sensors, n_paths=1024, n_patches=577, max_orders=30, seed=2)
     clock.append(now())

@@ -17,7 +17,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
 from dapple.survey import designs, hemisphere
-from dapple.survey.reach import Reach
+from dapple.survey.voxel_status import Reach
 from dapple.virtual import stands
 
 SPACING_M = 7.5

@@ -11,9 +11,9 @@ from pathlib import Path
 sys.path.append(str(Path(workflow.basedir) / "scripts"))
 
 from dapple import workflow as dapple_workflow
-from dapple.config import validate
+from dapple.config.settings import validate
 from dapple.errors import InputError
-from dapple.light.times import label, time_range
+from dapple.times import label, time_range
 from dapple.streams import stream_seed
 
 try:

@@ -99,5 +99,5 @@ def stability_batches():
 
 def stability_model():
     """The fitted verdict; none before one was fitted to a first map."""
-    path = Path("scripts/dapple/stability/verdict_model.json")
+    path = Path("scripts/dapple/verdict/verdict_model.json")
     return str(path) if (Path(workflow.basedir) / path).is_file() else []

@@ -33,7 +33,7 @@ rule verdict:
         sky=results("sky/sky.nc") if LIT else [],
         sensors=results("sky/sensors.csv") if LIT else [],
         records=results("statistics/records.csv") if COMPARED else [],
-        model="scripts/dapple/stability/verdict_model.json",
+        model="scripts/dapple/verdict/verdict_model.json",
         code=code("verdict"),
     output:
         verdict=results("verdict.json"),

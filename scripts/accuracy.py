@@ -3,9 +3,9 @@
 import numpy as np
 import pandas as pd
 
-from dapple.formats import json, polygons, rasters
+from dapple.formats import geojson, json, rasters
 from dapple.formats.atomic import atomic
-from dapple.retrieval import evaluation, intervals, maps, network, training
+from dapple.retrieval import evaluation, intervals, maps, network, training_entries
 from dapple.retrieval.noise import Noise
 from dapple.workflow import run
 
@@ -48,7 +48,7 @@ def simulated(frame, networks, interval, params):
     parts = network.split(
         frame["combination"].to_numpy(), seed=params.split_seed, **dict(params.split)
     )
-    features, target = training.features(frame), frame["chlorophyll_ug_cm2"].to_numpy(float)
+    features, target = training_entries.features(frame), frame["chlorophyll_ug_cm2"].to_numpy(float)
     noisy = Noise(**params.errors).add(features, np.random.default_rng(params.split_seed))
     rows = []
     for test_set, part, bands in (
@@ -71,8 +71,8 @@ def simulated(frame, networks, interval, params):
 
 def field(map_path, crowns_path, seeds):
     """Scores on trees, and the trees."""
-    found, crowns = rasters.read(map_path), polygons.read(crowns_path)
-    polygons.require_crs(crowns, found.crs, crowns_path)
+    found, crowns = rasters.read(map_path), geojson.read(crowns_path)
+    geojson.require_crs(crowns, found.crs, crowns_path)
     table = evaluation.trees(
         found.values, crowns.geometries, crowns.names, crowns.lcc_ug_cm2,
         left_m=found.left_m, top_m=found.top_m, cell_m=found.pixel_m, where=crowns_path,

@@ -6,29 +6,31 @@ from dataclasses import replace
 import numpy as np
 import yaml
 
-from dapple.formats import json, light, scenes, voxels
+from dapple.advice import cheapest, refinements
+from dapple.formats import json, netcdf, voxel_grids
 from dapple.formats.atomic import atomic
-from dapple.light import advice, choice, pilot, sensors, series, traced
-from dapple.light.scene import Scene
-from dapple.light.times import label
+from dapple.light import light_model, series
+from dapple.scene import scene_files, sensors, traced
+from dapple.scene.surfaces import Scene
+from dapple.times import label
 from dapple.workflow import run
 
 
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
-    sky, optics = light.read(inputs.sky), light.read_optics(inputs.optics)
+    sky, optics = netcdf.read(inputs.sky), netcdf.read_optics(inputs.optics)
     table = sensors.read_local(inputs.sensors)
     lit = np.flatnonzero(series.open_sky_par(sky).to_numpy() > 0)
-    chosen = pilot.spread(len(table), params.sensors)
-    moments = lit[pilot.spread(len(lit), params.times)]
-    stamps = light.times(sky)
+    chosen = light_model.spread(len(table), params.sensors)
+    moments = lit[light_model.spread(len(lit), params.times)]
+    stamps = netcdf.times(sky)
     step_min = np.diff(stamps).min().total_seconds() / 60 if len(stamps) > 1 else 0.0
-    one = advice.Pilot(
+    one = refinements.Pilot(
         table[["x_m", "y_m", "z_m"]].to_numpy()[chosen],
         sky.isel(time=moments),
         optics,
-        finest=pilot.Model(max_orders=params.max_orders, bands=len(optics)),
-        effort=pilot.Effort(
+        finest=light_model.Model(max_orders=params.max_orders, bands=len(optics)),
+        effort=light_model.Effort(
             paths=params.paths,
             sky_rays=params.paths,
             shadow_tolerance=params.shadow_tolerance,
@@ -40,18 +42,18 @@ def main(snakemake):
         repeats=params.repeats,
         seed=params.seed,
     )
-    base = scenes.read([inputs.leaves], inputs.wood, params.ground_z_m)[0]
+    base = scene_files.read([inputs.leaves], inputs.wood, params.ground_z_m)[0]
     loaded = traced.load(base, params.variant)
     truth = None
     if inputs.truth:
-        true = scenes.read([inputs.truth[0]], inputs.truth[1], params.ground_z_m)[0]
+        true = scene_files.read([inputs.truth[0]], inputs.truth[1], params.ground_z_m)[0]
         truth = one.light(traced.load(true, params.variant), one.finest)[0]
-    effects, finest = advice.model_effects(one, loaded, truth=truth)
-    effects += advice.step_effects(one, loaded, sky, seed=params.seed)
-    scale = choice.Scale.between((len(chosen), len(moments)), (len(table), len(stamps)))
+    effects, finest = refinements.model_effects(one, loaded, truth=truth)
+    effects += refinements.step_effects(one, loaded, sky, seed=params.seed)
+    scale = cheapest.Scale.between((len(chosen), len(moments)), (len(table), len(stamps)))
     best = replace(one.finest, step_min=step_min)
     print("model refinements measured", flush=True)
-    found = choice.choose(
+    found = cheapest.choose(
         effects,
         best,
         tolerance=params.tolerance,
@@ -63,7 +65,7 @@ def main(snakemake):
     print(f"chosen: {found}", flush=True)
     geometry = geometry_effects(one, base, inputs, params, truth)
     costs = {
-        name: choice.predicted(effects, best, model, scale)
+        name: cheapest.predicted(effects, best, model, scale)
         for name, model in (("finest", best), ("chosen", found.model))
     }
     facts = {
@@ -83,12 +85,12 @@ def main(snakemake):
             "variant": params.variant,
             "cores": len(os.sched_getaffinity(0)),
         },
-        "refinements": advice.rows(effects),
-        "geometry": advice.rows(geometry),
+        "refinements": refinements.rows(effects),
+        "geometry": refinements.rows(geometry),
         "notes": notes(params, inputs, effects),
     }
     with atomic(snakemake.output.advice) as partial:
-        partial.write_text(HEAD + yaml.safe_dump(advice.rounded(facts), sort_keys=False))
+        partial.write_text(HEAD + yaml.safe_dump(refinements.rounded(facts), sort_keys=False))
     json.write(snakemake.output.model, found.model.as_dict())
 
 
@@ -112,7 +114,7 @@ def geometry_effects(one, base, inputs, params, truth):
         (
             size,
             lambda leaves=leaves, branches=branches: load(
-                scenes.read([leaves], branches, params.ground_z_m)[0]
+                scene_files.read([leaves], branches, params.ground_z_m)[0]
             ),
         )
         for size, leaves, branches in zip(
@@ -122,7 +124,9 @@ def geometry_effects(one, base, inputs, params, truth):
     turbid = [
         (
             size,
-            lambda path=path: load(Scene({"wood": wood}, voxels.read(path), params.ground_z_m)),
+            lambda path=path: load(
+                Scene({"wood": wood}, voxel_grids.read(path), params.ground_z_m)
+            ),
         )
         for size, path in zip(params.voxel_sizes_m, inputs.voxels, strict=False)
     ]
@@ -136,7 +140,7 @@ def geometry_effects(one, base, inputs, params, truth):
         ("voxel_size_m", turbid),
         ("wood", branches),
     ):
-        found += advice.geometry_effects(one, name, ladder, truth=truth)
+        found += refinements.geometry_effects(one, name, ladder, truth=truth)
         print(f"{name} measured", flush=True)
     return found
 

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import yaml
 
-from dapple.figures import advice, style
+from dapple.figures import effects_chart, style
 from dapple.workflow import run
 
 
 def main(snakemake):
     facts = yaml.safe_load(Path(snakemake.input.advice).read_text())
-    style.save(advice.draw(facts), snakemake.output.figure)
+    style.save(effects_chart.draw(facts), snakemake.output.figure)
 
 
 if __name__ == "__main__":

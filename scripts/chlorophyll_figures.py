@@ -3,9 +3,9 @@
 import numpy as np
 import pandas as pd
 
-from dapple.figures import chlorophyll, style
-from dapple.formats import polygons, rasters
-from dapple.retrieval import training
+from dapple.figures import chlorophyll_maps, style
+from dapple.formats import geojson, rasters
+from dapple.retrieval import training_entries
 from dapple.workflow import run
 
 QUANTILES = {"low": 0.05, "middle": 0.5, "high": 0.95}
@@ -17,25 +17,25 @@ def main(snakemake):
     accuracy = accuracy[accuracy["seed"].astype(str) == "ensemble"]
     tests = pd.concat([pd.read_parquet(path) for path in inputs.tests])
     own = accuracy[accuracy["test_set"] == "entries"]
-    style.save(chlorophyll.simulated(tests, own), output.simulated)
+    style.save(chlorophyll_maps.simulated(tests, own), output.simulated)
     trees = pd.concat([pd.read_csv(path) for path in inputs.trees])
     own = accuracy[accuracy["test_set"] == "field"]
-    style.save(chlorophyll.field(trees, own), output.field)
+    style.save(chlorophyll_maps.field(trees, own), output.field)
     entries = {
-        path: quantiles(pd.read_parquet(path, columns=list(training.BANDS)), taught)
+        path: quantiles(pd.read_parquet(path, columns=list(training_entries.BANDS)), taught)
         for path, taught in zip(inputs.training, params.taught, strict=True)
     }
-    figure = chlorophyll.spectra(pd.read_csv(inputs.pixels), pd.concat(entries.values()))
+    figure = chlorophyll_maps.spectra(pd.read_csv(inputs.pixels), pd.concat(entries.values()))
     style.save(figure, output.spectra)
     histories = [
         pd.read_csv(path).assign(**taught)
         for path, taught in zip(inputs.histories, params.taught, strict=True)
     ]
-    style.save(chlorophyll.losses(pd.concat(histories)), output.losses)
+    style.save(chlorophyll_maps.losses(pd.concat(histories)), output.losses)
     images, found = rasters.read(inputs.canopy), rasters.read(inputs.map)
-    crowns = polygons.read(inputs.crowns)
+    crowns = geojson.read(inputs.crowns)
     rings, truth = outlines(crowns, np.array([found.left_m, found.top_m]))
-    figure = chlorophyll.chlorophyll_map(
+    figure = chlorophyll_maps.chlorophyll_map(
         found.values[:5],
         cell_m=found.pixel_m,
         size_m=(images.right_m - images.left_m, images.top_m - images.bottom_m),

@@ -4,9 +4,10 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from dapple.formats import light, scenes
-from dapple.light.reference import Reference
-from dapple.light.times import spread
+from dapple.formats import netcdf
+from dapple.light.timestep_series import Reference
+from dapple.scene import scene_files
+from dapple.times import spread
 from dapple.workflow import run
 
 LIFT_M = 0.01
@@ -15,10 +16,10 @@ LIFT_M = 0.01
 
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
-    sky = light.read(inputs.sky)
-    chosen = spread(light.times(sky), params.times, count=4)
+    sky = netcdf.read(inputs.sky)
+    chosen = spread(netcdf.times(sky), params.times, count=4)
     # One placement is what stands there at a time; a mean would blur its flecks.
-    scene = scenes.read(inputs.leaves[:1], inputs.wood, params.ground_z_m)[0]
+    scene = scene_files.read(inputs.leaves[:1], inputs.wood, params.ground_z_m)[0]
     low, high = scene.bounds_m
     margin = params.margin_m
     x, y = (
@@ -30,7 +31,7 @@ def main(snakemake):
     points = pd.DataFrame({"x_m": east.ravel(), "y_m": north.ravel(), "z_m": level})
     points.insert(0, "sensor", [f"g{k}" for k in range(len(points))])
     at_chosen = sky.isel(time=chosen)
-    optics = light.read_optics(inputs.optics)
+    optics = netcdf.read_optics(inputs.optics)
     reference = Reference([scene], at_chosen, optics, **params.engine, seed=params.seed)
     series = [reference.at(index, points)["par_umol_m2_s"] for index in range(len(chosen))]
     par = np.stack([one.to_numpy().reshape(east.shape) for one in series])
@@ -43,14 +44,14 @@ def main(snakemake):
             )
         },
         coords={
-            "time": light.time_coordinate(light.times(at_chosen)),
+            "time": netcdf.time_coordinate(netcdf.times(at_chosen)),
             "y": ("y", y, {"units": "m", "long_name": "north"}),
             "x": ("x", x, {"units": "m", "long_name": "east"}),
         },
     )
     for name in ("sun_zenith_deg", "sun_azimuth_deg"):
         par_map[name] = at_chosen[name]
-    light.write(snakemake.output.map, par_map)
+    netcdf.write(snakemake.output.map, par_map)
 
 
 if __name__ == "__main__":

@@ -3,12 +3,12 @@
 import resource
 import time
 
-from dapple.formats import coefficients as files
-from dapple.formats import json, rasters, scenes
+from dapple.formats import json, rasters
 from dapple.frames import direction_from_angles
-from dapple.light import traced
+from dapple.retrieval import coefficient_files as files
 from dapple.retrieval import image_paths, maps
 from dapple.retrieval.coefficients import Window, projection_error, remainder_bound
+from dapple.scene import scene_files, traced
 from dapple.workflow import options, run
 
 BRIGHT = ([[0.47]], [[0.47]], [[0.3]], [[0.4]])
@@ -29,7 +29,7 @@ def main(snakemake):
     )
     n_paths = max(params["paths_per_pixel"], -(-params["least_paths"] // window.n_pixels))
     started = time.perf_counter()
-    scene = scenes.read_plot(inputs.leaves, inputs.wood, inputs.terrain)
+    scene = scene_files.read_plot(inputs.leaves, inputs.wood, inputs.terrain)
     coefficients = image_paths.trace(
         traced.load(scene, params["variant"]),
         window,

@@ -6,13 +6,14 @@ import time
 import numpy as np
 import pandas as pd
 
-from dapple.formats import coefficients as files
-from dapple.formats import json, scenes
+from dapple.formats import json
 from dapple.formats.atomic import atomic
 from dapple.frames import direction_from_angles
-from dapple.light.scene import Optics
+from dapple.retrieval import coefficient_files as files
 from dapple.retrieval import coefficients as collision
-from dapple.retrieval import comparison, direct, semiless, spectra
+from dapple.retrieval import comparison, rendered_images, semiless, spectra
+from dapple.scene import scene_files
+from dapple.scene.surfaces import Optics
 from dapple.streams import stream_seed
 from dapple.workflow import options, run
 
@@ -24,7 +25,7 @@ PER_STRUCTURE = 64
 
 def main(snakemake):
     params, inputs = options(snakemake.params), snakemake.input
-    scene = scenes.read_plot(inputs.leaves, inputs.wood, inputs.terrain)
+    scene = scene_files.read_plot(inputs.leaves, inputs.wood, inputs.terrain)
     traced, fitted = files.read(inputs.coefficients), files.read_semiless(inputs.semiless)
     light = params["bark"], np.asarray(params["diffuse_share"])
     drawn, properties = spectra.combinations(
@@ -67,7 +68,7 @@ def renders(scene, traced, properties, light, params):
     """Means of direct renders of every combination, their times and paths per pixel."""
     sun = direction_from_angles(params["sun"]["zenith_deg"], params["sun"]["azimuth_deg"])
     bark, share = light
-    renderer = direct.Renderer(scene, variant=params["variant"])
+    renderer = rendered_images.Renderer(scene, variant=params["variant"])
     parts, seconds = [], []
     for k in range(-1, len(properties)):  # the first is not counted: kernels are compiled
         row = max(k, 0)

@@ -5,8 +5,8 @@ import time
 
 import numpy as np
 
-from dapple.formats import coefficients as files
 from dapple.formats import json
+from dapple.retrieval import coefficient_files as files
 from dapple.retrieval import semiless
 from dapple.workflow import options, run
 

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from dapple.formats import json, rasters
-from dapple.retrieval import intervals, maps, network, training
+from dapple.retrieval import intervals, maps, network, training_entries
 from dapple.retrieval.noise import Noise
 from dapple.workflow import run
 
@@ -23,7 +23,7 @@ def main(snakemake):
         noise = Noise(**params.errors) if taught["network"] == "robust" else None
         interval, known = calibrate(pd.read_parquet(table_path), networks, noise, params)
         observed = rasters.read(observed_path)
-        bands = rasters.select(observed, training.BANDS, observed_path).values
+        bands = rasters.select(observed, training_entries.BANDS, observed_path).values
         layers, each = maps.retrieve(networks, interval, known, bands)
         names = (*maps.MAP_BANDS, *(f"seed_{seed}_ug_cm2" for seed in params.seeds))
         rasters.write(
@@ -45,7 +45,7 @@ def calibrate(frame, networks, noise, params):
     parts = network.split(
         frame["combination"].to_numpy(), seed=params.split_seed, **dict(params.split)
     )
-    features, target = training.features(frame), frame["chlorophyll_ug_cm2"].to_numpy(float)
+    features, target = training_entries.features(frame), frame["chlorophyll_ug_cm2"].to_numpy(float)
     if noise:
         features = noise.add(features, np.random.default_rng(params.split_seed))
     held = parts["validation"]

@@ -1,23 +1,24 @@
 """PAR through the day: direct beam traced now, sky and scattered light from counted paths."""
 
-from dapple.formats import json, light, scenes, transport
-from dapple.light import pilot, sensors, series, traced
+from dapple.formats import json, netcdf
+from dapple.light import light_model, series, transport_files
+from dapple.scene import scene_files, sensors, traced
 from dapple.streams import stream_seed
 from dapple.workflow import run
 
 
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
-    sky, optics = light.read(inputs.sky), light.read_optics(inputs.optics)
+    sky, optics = netcdf.read(inputs.sky), netcdf.read_optics(inputs.optics)
     table = sensors.read_local(inputs.sensors)
     advised = json.read(inputs.model) if inputs.model else {"bands": len(optics)}
-    model = pilot.Model(**advised)
-    sky, optics = pilot.simplified(sky, optics, model)
+    model = light_model.Model(**advised)
+    sky, optics = light_model.simplified(sky, optics, model)
     placements = []
     for number, (leaves, counted) in enumerate(zip(inputs.leaves, inputs.transports, strict=True)):
-        scene = scenes.read([leaves], inputs.wood, params.ground_z_m)[0]
-        paths = transport.read(counted)
-        sunlit = pilot.sunlit(
+        scene = scene_files.read([leaves], inputs.wood, params.ground_z_m)[0]
+        paths = transport_files.read(counted)
+        sunlit = light_model.sunlit(
             traced.load(scene, params.variant),
             table[["x_m", "y_m", "z_m"]].to_numpy(),
             sky,
@@ -31,7 +32,7 @@ def main(snakemake):
         placements.append(
             series.compute(sunlit, paths, sky, optics, sun_kernel_deg=params.sun_kernel_deg)
         )
-    light.write(snakemake.output.light, series.summarise(placements, list(table["sensor"]), sky))
+    netcdf.write(snakemake.output.light, series.summarise(placements, list(table["sensor"]), sky))
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ import time
 import pandas as pd
 
 from dapple.formats.atomic import atomic
-from dapple.retrieval import network, training
+from dapple.retrieval import network, training_entries
 from dapple.retrieval.noise import Noise
 from dapple.workflow import run
 
@@ -16,7 +16,7 @@ def main(snakemake):
     parts = network.split(
         frame["combination"].to_numpy(), seed=params.split_seed, **dict(params.split)
     )
-    features, target = training.features(frame), frame["chlorophyll_ug_cm2"].to_numpy()
+    features, target = training_entries.features(frame), frame["chlorophyll_ug_cm2"].to_numpy()
     margin = 0.1 * (params.range_ug_cm2[1] - params.range_ug_cm2[0])
     histories = []
     for seed, path in zip(params.seeds, snakemake.output.networks, strict=True):

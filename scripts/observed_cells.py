@@ -5,13 +5,13 @@ import pandas as pd
 
 from dapple.formats import rasters
 from dapple.formats.atomic import atomic
-from dapple.retrieval import maps, training
+from dapple.retrieval import maps, training_entries
 from dapple.workflow import run
 
 
 def main(snakemake):
     params, path = snakemake.params, snakemake.input.images
-    observed = rasters.select(rasters.read(path), training.BANDS, path)
+    observed = rasters.select(rasters.read(path), training_entries.BANDS, path)
     rasters.require_reflectance(observed, path)
     heights = rasters.read(snakemake.input.heights)
     rasters.require_overlap(
@@ -33,15 +33,15 @@ def main(snakemake):
     canopy = maps.canopy(
         height_m, min_height_m=params.canopy_height_m, where=snakemake.input.heights
     )
-    over = training.cells(canopy.shape, pixel_m=params.pixel_m, cell_m=params.cell_m)
-    found = training.aggregate(
-        training.chunks_of(image), canopy, over,
+    over = training_entries.cells(canopy.shape, pixel_m=params.pixel_m, cell_m=params.cell_m)
+    found = training_entries.aggregate(
+        training_entries.chunks_of(image), canopy, over,
         sunlit_nir=params.sunlit_nir, min_share=params.min_share,
     )  # fmt: skip
     corner = (observed.left_m, observed.top_m)
     for mask, (means, count) in found.items():
         layers = np.concatenate([means[0], count.astype(np.float32)])
-        bands = (*training.BANDS, "pixels")
+        bands = (*training_entries.BANDS, "pixels")
         raster = rasters.Raster(layers, *corner, params.cell_m, observed.crs, bands)
         rasters.write(snakemake.output[mask], raster)
         print(f"{mask}: {np.isfinite(means[0, 0]).sum()} of {means[0, 0].size} cells with data")
@@ -57,8 +57,8 @@ def main(snakemake):
 
 def pixel_spectra(image, canopy, sunlit_nir):
     """Mean and deviation of each band over sunlit, shaded and all canopy pixels."""
-    known = training.select(image, canopy, mask="all")
-    sunlit = training.select(image, canopy, mask="sunlit", sunlit_nir=sunlit_nir)
+    known = training_entries.select(image, canopy, mask="all")
+    sunlit = training_entries.select(image, canopy, mask="sunlit", sunlit_nir=sunlit_nir)
     kinds = {"sunlit": sunlit, "shaded": known & ~sunlit, "all": known}
     rows = [
         {
@@ -69,7 +69,7 @@ def pixel_spectra(image, canopy, sunlit_nir):
             "deviation": float(band[chosen].std()) if chosen.any() else np.nan,
         }
         for kind, chosen in kinds.items()
-        for name, band in zip(training.BANDS, image, strict=True)
+        for name, band in zip(training_entries.BANDS, image, strict=True)
     ]
     return pd.DataFrame(rows)
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from dapple.figures import page
+from dapple.figures import report
 from dapple.formats.atomic import atomic
 from dapple.workflow import run
 
@@ -10,7 +10,7 @@ from dapple.workflow import run
 def main(snakemake):
     folder = Path(snakemake.output.page).parent
     with atomic(snakemake.output.page) as partial:
-        partial.write_text(page.build(snakemake.params.experiment, folder), encoding="utf-8")
+        partial.write_text(report.build(snakemake.params.experiment, folder), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Fill the crowns of a plot with facets and lay the terrain under them."""
 
 from dapple.cloud import ground
-from dapple.figures import crowns as figure
+from dapple.figures import crown_map as figure
 from dapple.figures import style
 from dapple.formats import clouds, json, meshes, rasters
 from dapple.formats.atomic import atomic

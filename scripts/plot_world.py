@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from dapple.formats import json, meshes, polygons
+from dapple.formats import geojson, json, meshes
 from dapple.formats.atomic import atomic
 from dapple.streams import stream_seed
 from dapple.virtual import conifers, crown_outlines, plot_optics, plots, terrain
@@ -79,13 +79,13 @@ def write(trees, rings, settings, output):
     with atomic(output.trees) as partial:
         world.to_csv(partial, index=False, float_format="%.10g")
     chosen = np.flatnonzero(trees.sampled)
-    crowns = polygons.of_rings(
+    crowns = geojson.of_rings(
         [rings[k] + np.asarray(settings["origin_m"][:2]) for k in chosen],
         trees.tree.to_numpy()[chosen],
         trees.lcc_ug_cm2.to_numpy()[chosen],
         settings["crs"],
     )
-    polygons.write(output.crowns, crowns)
+    geojson.write(output.crowns, crowns)
 
 
 def describe(trees, grown, rings, size_m):

@@ -1,6 +1,6 @@
 """Reconstruct one planar polygon per voxel, separately for leaf and wood."""
 
-from dapple.formats import clouds, json, meshes, voxels
+from dapple.formats import clouds, json, meshes, voxel_grids
 from dapple.formats.clouds import LEAF, WOOD
 from dapple.structure import occlusion, summary
 from dapple.structure.polygons import reconstruct
@@ -17,7 +17,7 @@ def main(snakemake):
     wood = reconstruct(cloud.xyz_m[kinds == WOOD], what="wood", **settings)
     found = leaves.n_elements
     if correction:
-        grid = as_estimated(voxels.read(snakemake.input.voxels))
+        grid = as_estimated(voxel_grids.read(snakemake.input.voxels))
         leaves = occlusion.correct(leaves, grid, seed=settings["seed"], **correction)
     meshes.write_ply(snakemake.output.leaves, leaves)
     meshes.write_ply(snakemake.output.wood, wood)

@@ -3,11 +3,11 @@
 import numpy as np
 import pandas as pd
 
-from dapple.formats import json, light
+from dapple.formats import json, netcdf
 from dapple.formats.atomic import atomic
-from dapple.light import measured
 from dapple.light.series import open_sky_par
-from dapple.stats.records import pair
+from dapple.stats import measured
+from dapple.stats.pairs import pair
 from dapple.workflow import run
 
 
@@ -16,7 +16,7 @@ def main(snakemake):
     registration = json.read(inputs.registration)
     if params.kind == "virtual":
         records = measured.simulate(
-            light.read(inputs.truth),
+            netcdf.read(inputs.truth),
             noise_relative=params.noise_relative,
             noise_umol_m2_s=params.noise_umol_m2_s,
             calibration_relative=params.calibration_relative,
@@ -25,11 +25,11 @@ def main(snakemake):
         )
     else:
         records = measured.read(inputs.measured)
-    sky = open_sky_par(light.read(inputs.sky))
+    sky = open_sky_par(netcdf.read(inputs.sky))
     table = pd.concat(
         [
             pair(
-                light.read(path),
+                netcdf.read(path),
                 records,
                 sky,
                 reconstruction=name,

@@ -2,16 +2,16 @@
 
 import xarray as xr
 
-from dapple.formats import light
+from dapple.formats import netcdf
 from dapple.workflow import run
 
 
 def main(snakemake):
-    times = [light.read(path) for path in snakemake.input.times]
+    times = [netcdf.read(path) for path in snakemake.input.times]
     series = xr.concat(
         times, "time", data_vars="minimal", coords="minimal", combine_attrs="drop_conflicts"
     )
-    light.write(snakemake.output.light, series)
+    netcdf.write(snakemake.output.light, series)
 
 
 if __name__ == "__main__":

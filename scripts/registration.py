@@ -2,10 +2,12 @@
 
 import numpy as np
 
-from dapple.formats import json, scenes
-from dapple.light import measured, sensors, shade
-from dapple.light.sky import sky_dataset
-from dapple.light.sun import Site, broadband
+from dapple.formats import json
+from dapple.registration import shading
+from dapple.scene import scene_files, sensors
+from dapple.sky.sky_radiance import sky_dataset
+from dapple.sky.sun import Site, broadband
+from dapple.stats import measured
 from dapple.workflow import run
 
 
@@ -22,8 +24,8 @@ def main(snakemake):
         return sky_dataset(times, site, radiation, **params.atmosphere)
 
     table = sensors.read(inputs.sensors, params.origin_m)
-    found = shade.register(
-        scenes.read(inputs.leaves, inputs.wood),
+    found = shading.register(
+        scene_files.read(inputs.leaves, inputs.wood),
         table,
         measured.read(inputs.measured, sensors=table),
         sky_at=sky_at,

@@ -2,7 +2,7 @@
 
 from dapple.formats import json, meshes
 from dapple.formats.atomic import atomic
-from dapple.light import sensors
+from dapple.scene import sensors
 from dapple.workflow import run
 
 

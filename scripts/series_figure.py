@@ -2,10 +2,10 @@
 
 import pandas as pd
 
-from dapple.figures import series, style
-from dapple.formats import light
+from dapple.figures import daily_courses, style
+from dapple.formats import netcdf
 from dapple.stats import correlation
-from dapple.stats.records import simulated
+from dapple.stats.pairs import simulated
 from dapple.workflow import run
 
 
@@ -16,16 +16,16 @@ def main(snakemake):
         r = correlation.per_sensor(records)
     else:
         tables = [
-            simulated(light.read(path), name)
+            simulated(netcdf.read(path), name)
             for name, path in zip(params.reconstructions, inputs.light, strict=True)
         ]
         records, r = pd.concat(tables, ignore_index=True), None
     chosen = list(params.sensors)
     if not chosen and r is not None:
-        chosen = series.choose_sensors(r, reconstruction=params.reconstructions[0])
+        chosen = daily_courses.choose_sensors(r, reconstruction=params.reconstructions[0])
     if not chosen:
         chosen = list(records["sensor"].unique()[:: max(1, records["sensor"].nunique() // 6)][:6])
-    figure = series.draw(records, chosen, timezone=params.timezone, per_sensor=r)
+    figure = daily_courses.draw(records, chosen, timezone=params.timezone, per_sensor=r)
     style.save(figure, snakemake.output.figure)
 
 

@@ -2,10 +2,10 @@
 
 import pandas as pd
 
-from dapple.formats import json, light
-from dapple.light.sky import sky_dataset
-from dapple.light.sun import Site, broadband
-from dapple.light.times import time_range
+from dapple.formats import json, netcdf
+from dapple.sky.sky_radiance import sky_dataset
+from dapple.sky.sun import Site, broadband
+from dapple.times import time_range
 from dapple.workflow import run
 
 
@@ -17,7 +17,7 @@ def main(snakemake):
     times = time_range(**params.time) - pd.Timedelta(seconds=registration["clock_offset_s"])
     radiation = broadband(times, site, path=snakemake.input.radiation or None, **params.radiation)
     sky = sky_dataset(times, site, radiation, **params.atmosphere)
-    light.write(snakemake.output.sky, sky)
+    netcdf.write(snakemake.output.sky, sky)
 
 
 if __name__ == "__main__":

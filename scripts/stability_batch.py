@@ -6,7 +6,7 @@ from dapple import engine
 from dapple.formats import clouds, json, meshes, shots
 from dapple.formats.atomic import atomic
 from dapple.stability import outcome, stressors
-from dapple.stability.run import Chain
+from dapple.stability.chain import Chain
 from dapple.stability.stressors import UNDISTURBED
 from dapple.stability.world import Setup
 from dapple.workflow import run

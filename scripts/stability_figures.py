@@ -2,15 +2,14 @@
 
 import pandas as pd
 
-from dapple.figures import style
-from dapple.stability import figures
+from dapple.figures import stability_map, style
 from dapple.workflow import run
 
 
 def main(snakemake):
     points = pd.read_csv(snakemake.input.points, dtype={"label": str})
-    style.save(figures.heat_map(points), snakemake.output.map)
-    style.save(figures.curves(points), snakemake.output.curves)
+    style.save(stability_map.heat_map(points), snakemake.output.map)
+    style.save(stability_map.curves(points), snakemake.output.curves)
 
 
 if __name__ == "__main__":

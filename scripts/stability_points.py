@@ -3,7 +3,8 @@
 import pandas as pd
 
 from dapple.formats.atomic import atomic
-from dapple.stability import thresholds, training, verdict
+from dapple.stability import thresholds
+from dapple.verdict import fitting, judgement
 from dapple.workflow import run
 
 TEXT = {"label": str, "failed": str}
@@ -35,8 +36,10 @@ def main(snakemake):
 def judged(points, model, with_records):
     """Verdicts by models that were not fitted to the run judged; a few runs by the stored ones."""
     if len(points) >= ENOUGH:
-        return training.cross_flagged(points, with_records=with_records)
-    return training.flagged(points, verdict.load(model, with_records=with_records)) if model else ""
+        return fitting.cross_flagged(points, with_records=with_records)
+    return (
+        fitting.flagged(points, judgement.load(model, with_records=with_records)) if model else ""
+    )
 
 
 if __name__ == "__main__":

@@ -5,12 +5,12 @@ from pathlib import Path
 import pandas as pd
 
 from dapple import engine
-from dapple.formats import light, scenes
+from dapple.formats import netcdf
 from dapple.formats.atomic import atomic
-from dapple.light import sensors, traced
-from dapple.stability import records
-from dapple.stability.sensitivity import moved_light
-from dapple.stats.records import simulated
+from dapple.light.moved_sensors import moved_light
+from dapple.scene import scene_files, sensors, traced
+from dapple.stability import worse_records
+from dapple.stats.pairs import simulated
 from dapple.workflow import run
 
 TOLERANCE, MAX_RAYS = 0.01, 1024
@@ -32,7 +32,7 @@ def main(snakemake):
         print(f"sensors {error_m:g} m off", flush=True)
         return told.drop(columns="simulated").merge(there, on=["reconstruction", "sensor", "time"])
 
-    found = records.table(
+    found = worse_records.table(
         told.reset_index(drop=True),
         pd.concat([simulated(one, name) for name, one in lit.light.items()], ignore_index=True),
         moved,
@@ -48,16 +48,16 @@ class Lit:
     """The light of a run, its scenes and what shines on them."""
 
     def __init__(self, inputs, params, reporting):
-        self.params, self.sky = params, light.read(inputs.sky)
+        self.params, self.sky = params, netcdf.read(inputs.sky)
         self.light = {
-            Path(path).stem: light.read(path).sel(sensor=reporting) for path in inputs.light
+            Path(path).stem: netcdf.read(path).sel(sensor=reporting) for path in inputs.light
         }
         table = sensors.read_local(inputs.sensors).set_index("sensor")
         self.places_m = table.loc[reporting, ["x_m", "y_m", "z_m"]].to_numpy()
         self.scenes = {}
         for name in params.methods:
             grid = [path for path in inputs.voxels if Path(path).parent.name == name]
-            found = scenes.read(grid or inputs.leaves, inputs.wood, params.ground_z_m)
+            found = scene_files.read(grid or inputs.leaves, inputs.wood, params.ground_z_m)
             self.scenes[name] = [traced.load(scene, params.variant) for scene in found]
 
     def moved(self, name, error_m, seed):

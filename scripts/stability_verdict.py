@@ -3,13 +3,13 @@
 import pandas as pd
 
 from dapple.formats.atomic import atomic
-from dapple.stability import verdict
+from dapple.verdict import judgement
 from dapple.workflow import run
 
 
 def main(snakemake):
     points = pd.read_csv(snakemake.input.points, dtype={"label": str, "failed": str})
-    found = verdict.store(snakemake.output.model, points)
+    found = judgement.store(snakemake.output.model, points)
     rows = []
     for kind, facts in found.items():
         for check, rates in facts["rates"].items():

@@ -4,10 +4,9 @@ import dataclasses
 
 import numpy as np
 
-from dapple.formats import survey
 from dapple.streams import stream_seed
-from dapple.survey import designs, hemisphere
-from dapple.survey.reach import Reach
+from dapple.survey import designs, grid_files, hemisphere
+from dapple.survey.voxel_status import Reach
 from dapple.virtual import stands
 from dapple.workflow import options, run
 
@@ -28,7 +27,7 @@ def main(snakemake):
             reach.add(beams, np.full(len(beams.range_m), 1 << number))
     hit, passed = reach.joined()
     print(f"{len(places_m)} places where a scanner can stand")
-    survey.write(
+    grid_files.write(
         snakemake.output.reach,
         {"seen": hit | passed},
         positions_m=np.ravel(places_m),

@@ -3,10 +3,10 @@
 import numpy as np
 import pandas as pd
 
-from dapple.formats import survey, voxels
+from dapple.formats import voxel_grids
 from dapple.formats.atomic import atomic
-from dapple.survey import compare, correction
-from dapple.survey.reach import attribute
+from dapple.survey import compare, correction, grid_files
+from dapple.survey.voxel_status import attribute
 from dapple.virtual.stands import SPECIES
 from dapple.workflow import run
 
@@ -17,8 +17,8 @@ def main(snakemake):
     for (stand, seed, design), reach_path, cells_path in zip(
         params.runs, snakemake.input.reach, snakemake.input.cells, strict=True
     ):
-        truth = survey.read(snakemake.input.truth[params.truths.index((stand, seed))])
-        reach, density = survey.read(reach_path), voxels.read(cells_path)
+        truth = grid_files.read(snakemake.input.truth[params.truths.index((stand, seed))])
+        reach, density = grid_files.read(reach_path), voxel_grids.read(cells_path)
         bit = int(np.argmax(reach.attrs["n_beams"]))
         cells[stand, seed, design] = correction.cells_of(
             attribute(reach.hit.values, reach.passed.values, bit),

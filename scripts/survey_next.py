@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from dapple.cloud import ground
-from dapple.formats import clouds, shots, voxels
+from dapple.formats import clouds, shots, voxel_grids
 from dapple.formats.atomic import atomic
 from dapple.survey import airborne, fill, plan
 from dapple.workflow import run
@@ -12,7 +12,7 @@ from dapple.workflow import run
 
 def from_scans(inputs, params):
     """Density, kriged where it is unknown, its lower corner, and the places of the scans."""
-    density = voxels.read(inputs.voxels)
+    density = voxel_grids.read(inputs.voxels)
     guess, _, _ = fill.krige(
         density.plant_area_density_m2_m3.values.astype(np.float64),
         density.standard_error_m2_m3.values.astype(np.float64),

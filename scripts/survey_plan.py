@@ -3,10 +3,10 @@
 import numpy as np
 import pandas as pd
 
-from dapple.formats import survey, voxels
+from dapple.formats import voxel_grids
 from dapple.formats.atomic import atomic
 from dapple.streams import stream_seed
-from dapple.survey import fill, plan
+from dapple.survey import fill, grid_files, plan
 from dapple.workflow import run
 
 N_RANDOM = 50
@@ -19,8 +19,8 @@ def main(snakemake):
     for (stand, seed), truth_path, seen_path, cells_path in zip(
         params.truths, inputs.truth, inputs.candidates, inputs.cells, strict=True
     ):
-        truth, scans = survey.read(truth_path), survey.read(seen_path)
-        first = voxels.read(cells_path)
+        truth, scans = grid_files.read(truth_path), grid_files.read(seen_path)
+        first = voxel_grids.read(cells_path)
         filled = (truth.leaf_area_m2 + truth.wood_area_m2).values > 0
         seen = scans.seen.values[filled].astype(np.uint32)
         positions_m = scans.attrs["positions_m"].reshape(-1, 3)

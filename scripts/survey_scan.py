@@ -2,11 +2,11 @@
 
 import time
 
-from dapple.formats import survey, voxels
+from dapple.formats import voxel_grids
 from dapple.streams import stream_seed
 from dapple.structure.voxels import Grid, plant_area_density
-from dapple.survey import designs, hemisphere
-from dapple.survey.reach import Reach
+from dapple.survey import designs, grid_files, hemisphere
+from dapple.survey.voxel_status import Reach
 from dapple.virtual import stands
 from dapple.workflow import options, run
 
@@ -42,13 +42,13 @@ def main(snakemake):
     seconds = time.perf_counter() - begun
     n_beams = scanner.n_beams(len(positions_m))
     print(f"{max(n_beams)} beams of {scanner.sub_rays} rays in {seconds:.1f} s")
-    survey.write(
+    grid_files.write(
         snakemake.output.reach,
         {"hit": hit, "passed": passed},
         n_beams=n_beams,
         voxel_size_m=settings["voxel_size_m"],
     )
-    voxels.write(snakemake.output.cells, density)
+    voxel_grids.write(snakemake.output.cells, density)
 
 
 if __name__ == "__main__":

@@ -3,10 +3,9 @@
 import numpy as np
 import pandas as pd
 
-from dapple.formats import survey
 from dapple.formats.atomic import atomic
-from dapple.survey import shadow
-from dapple.survey.reach import attribute
+from dapple.survey import grid_files, shadow
+from dapple.survey.voxel_status import attribute
 from dapple.workflow import run
 
 
@@ -17,9 +16,9 @@ def main(snakemake):
     for (stand, seed, design), path in zip(params.runs, snakemake.input.reach, strict=True):
         if (stand, seed) not in truths:
             at = params.truths.index((stand, seed))
-            truth = survey.read(snakemake.input.truth[at])
+            truth = grid_files.read(snakemake.input.truth[at])
             truths = {(stand, seed): (truth.leaf_area_m2 + truth.wood_area_m2).values > 0}
-        filled, reach = truths[stand, seed], survey.read(path)
+        filled, reach = truths[stand, seed], grid_files.read(path)
         n_beams = np.atleast_1d(reach.attrs["n_beams"])
         for bit, n in enumerate(n_beams):
             found = attribute(reach.hit.values, reach.passed.values, bit)

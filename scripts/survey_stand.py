@@ -1,6 +1,6 @@
 """Grow a stand and write what each of its voxels truly holds."""
 
-from dapple.formats import survey
+from dapple.survey import grid_files
 from dapple.virtual import stands
 from dapple.workflow import options, run
 
@@ -16,7 +16,7 @@ def main(snakemake):
     print(
         f"leaf area index {areas['leaf_area_m2'].sum() / (stand.size_m[0] * stand.size_m[1]):.4f}"
     )
-    survey.write(snakemake.output.truth, areas, voxel_size_m=size_m)
+    grid_files.write(snakemake.output.truth, areas, voxel_size_m=size_m)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import pandas as pd
 from dapple.formats.atomic import atomic
 from dapple.streams import stream_seed
 from dapple.survey import correction, designs, hemisphere, shadow
-from dapple.survey.reach import Reach, attribute
+from dapple.survey.voxel_status import Reach, attribute
 from dapple.virtual import stands
 from dapple.workflow import options, run
 

@@ -1,17 +1,17 @@
 """Light at the sensors by Mitsuba's own integrators, one cached file a timestep."""
 
-from dapple.formats import light, scenes
-from dapple.light import sensors
-from dapple.light.reference import Reference, run_all
+from dapple.formats import netcdf
+from dapple.light.timestep_series import Reference, run_all
+from dapple.scene import scene_files, sensors
 from dapple.workflow import run
 
 
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
     reference = Reference(
-        scenes.read(inputs.leaves, inputs.wood, params.ground_z_m),
-        light.read(inputs.sky).isel(time=params.times),
-        light.read_optics(inputs.optics),
+        scene_files.read(inputs.leaves, inputs.wood, params.ground_z_m),
+        netcdf.read(inputs.sky).isel(time=params.times),
+        netcdf.read_optics(inputs.optics),
         **params.engine,
         seed=params.seed,
     )

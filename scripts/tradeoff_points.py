@@ -6,13 +6,14 @@ from itertools import product
 
 import numpy as np
 
-from dapple.formats import light, scenes, voxels
+from dapple.advice import tradeoff
+from dapple.formats import netcdf, voxel_grids
 from dapple.formats.atomic import atomic
-from dapple.light import pilot, sensors, series, traced
-from dapple.light.pilot import Cost, Effort, Model, timed
-from dapple.light.reference import Reference
-from dapple.light.scene import Scene
-from dapple.stats import tradeoff
+from dapple.light import light_model, series
+from dapple.light.light_model import Cost, Effort, Model, timed
+from dapple.light.timestep_series import Reference
+from dapple.scene import scene_files, sensors, traced
+from dapple.scene.surfaces import Scene
 from dapple.workflow import run
 
 FINEST_PATHS, FINEST_PATCHES = 65_536, 2305
@@ -24,11 +25,11 @@ class Grid:
     """The sensors, times and references that all points share."""
 
     def __init__(self, params, inputs):
-        sky, self.optics = light.read(inputs.sky), light.read_optics(inputs.optics)
+        sky, self.optics = netcdf.read(inputs.sky), netcdf.read_optics(inputs.optics)
         table = sensors.read_local(inputs.sensors)
         lit = np.flatnonzero(series.open_sky_par(sky).to_numpy() > 0)
-        self.sky = sky.isel(time=lit[pilot.spread(len(lit), params.times)])
-        self.table = table.iloc[pilot.spread(len(table), params.sensors)]
+        self.sky = sky.isel(time=lit[light_model.spread(len(lit), params.times)])
+        self.table = table.iloc[light_model.spread(len(table), params.sensors)]
         self.points_m = self.table[["x_m", "y_m", "z_m"]].to_numpy()
         self.open_sky = series.open_sky_par(self.sky).to_numpy()
         self.params = params
@@ -38,7 +39,7 @@ class Grid:
         # Without a truth the first geometry, the finest polygons, stands for it.
         _, _, best = next(geometries(params, inputs))
         if inputs.truth:
-            best = scenes.read([inputs.truth[0]], inputs.truth[1], params.ground_z_m)[0]
+            best = scene_files.read([inputs.truth[0]], inputs.truth[1], params.ground_z_m)[0]
         self.reference = self.finest(traced.load(best, params.variant))
         self.reference_name = "truth" if inputs.truth else "finest polygons"
 
@@ -57,7 +58,7 @@ class Grid:
     def light(self, scene, model, paths, repeats=1):
         """PAR (n, t) and what it cost."""
         runs = [
-            pilot.light(
+            light_model.light(
                 scene,
                 self.points_m,
                 self.sky,
@@ -69,7 +70,7 @@ class Grid:
             for _ in range(repeats)
         ]
         costs = [sum(parts.values(), Cost()) for _, parts in runs]
-        return runs[-1][0].par, pilot.least(costs)
+        return runs[-1][0].par, light_model.least(costs)
 
     def finest(self, scene):
         """PAR (n, t) of the finest setting."""
@@ -136,7 +137,7 @@ def timestep_points(grid, name, size_m, scene, finest):
             timed(lambda e=engine: [e.at(k, grid.table) for k in grid_times(grid)])
             for _ in range(grid.params.repeats)
         ]
-        found, cost = runs[-1][0], pilot.least([one for _, one in runs])
+        found, cost = runs[-1][0], light_model.least([one for _, one in runs])
         par = np.concatenate([one["par_umol_m2_s"].to_numpy() for one in found], axis=1)
         compile_s = max(first.wall_s - cost.wall_s / len(found), 0.0)
         setting = f"per timestep, {size_m:g} m, {rays} rays"
@@ -158,13 +159,13 @@ def geometries(params, inputs):
     for size, leaves, wood in zip(
         params.polygon_sizes_m, inputs.sized_leaves, inputs.sized_wood, strict=False
     ):
-        yield "polygons", size, scenes.read([leaves], wood, params.ground_z_m)[0]
-    base = scenes.read([inputs.leaves], inputs.wood, params.ground_z_m)[0]
+        yield "polygons", size, scene_files.read([leaves], wood, params.ground_z_m)[0]
+    base = scene_files.read([inputs.leaves], inputs.wood, params.ground_z_m)[0]
     if not inputs.sized_leaves:
         yield "polygons", params.polygon_size_m, base
     wood = {"wood": base.meshes["wood"]}
     for size, path in zip(params.voxel_sizes_m, inputs.voxels, strict=False):
-        yield f"voxels_{size}", size, Scene(wood, voxels.read(path), params.ground_z_m)
+        yield f"voxels_{size}", size, Scene(wood, voxel_grids.read(path), params.ground_z_m)
 
 
 def main(snakemake):
@@ -175,7 +176,7 @@ def main(snakemake):
         loads = [
             timed(lambda s=scene: traced.load(s, params.variant)) for _ in range(params.repeats)
         ]
-        loaded, load_cost = loads[-1][0], pilot.least([cost for _, cost in loads])
+        loaded, load_cost = loads[-1][0], light_model.least([cost for _, cost in loads])
         small = replace(grid.finest_model, sky_patches=PATCHES)
         first, again = (
             timed(lambda m=small, s=loaded: grid.light(s, m, min(params.paths)))[1].wall_s

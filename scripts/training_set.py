@@ -5,10 +5,10 @@ import time
 import numpy as np
 
 from dapple.errors import InputError
-from dapple.formats import coefficients as coefficient_files
 from dapple.formats import json, meshes, rasters
 from dapple.formats.atomic import atomic
-from dapple.retrieval import coefficients, prosail, semiless, spectra, training
+from dapple.retrieval import coefficient_files as coefficient_files
+from dapple.retrieval import coefficients, prosail, semiless, spectra, training_entries
 from dapple.workflow import options, run
 
 
@@ -30,14 +30,14 @@ def main(snakemake):
         check_window(window, canopy, origin_m, path)
         mask, pixel_m = canopy.values[0] > 0, canopy.pixel_m
     selection = params["selection"]
-    over = training.cells(mask.shape, pixel_m=pixel_m, cell_m=selection["cell_m"])
-    found = training.aggregate(
+    over = training_entries.cells(mask.shape, pixel_m=pixel_m, cell_m=selection["cell_m"])
+    found = training_entries.aggregate(
         chunks, mask, over,
         sunlit_nir=selection["sunlit_nir"], min_share=selection["min_share"],
     )  # fmt: skip
     for name, (means, count) in found.items():
         path = snakemake.output[name]
-        frame = training.entries(
+        frame = training_entries.entries(
             means, count, leaves,
             max_entries=params["max_entries"], seed=params["seed"], where=path,
         )  # fmt: skip
@@ -65,7 +65,7 @@ def images(path, properties, params):
 def level_canopies(paths, canopy, properties, origin_m, params):
     """SAIL of every cell with plants and canopy pixels, as pixels as large as cells."""
     cell_m = params["selection"]["cell_m"]
-    over = training.cells(canopy.values.shape[1:], pixel_m=canopy.pixel_m, cell_m=cell_m)
+    over = training_entries.cells(canopy.values.shape[1:], pixel_m=canopy.pixel_m, cell_m=cell_m)
     plants = meshes.concatenate([meshes.read_ply(path) for path in paths])
     index = prosail.plant_area_index(
         plants, left_m=canopy.left_m - origin_m[0], top_m=canopy.top_m - origin_m[1],

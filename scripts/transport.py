@@ -1,15 +1,16 @@
 """Trace paths from the sensors once, for any sky, spectrum and time."""
 
-from dapple.formats import json, scenes
-from dapple.formats import transport as files
-from dapple.light import sensors, series, traced, transport
+from dapple.formats import json
+from dapple.light import series, transport
+from dapple.light import transport_files as files
 from dapple.optics.surfaces import scene_optics
+from dapple.scene import scene_files, sensors, traced
 from dapple.workflow import run
 
 
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
-    scene = scenes.read([inputs.leaves], inputs.wood, params.ground_z_m)[0]
+    scene = scene_files.read([inputs.leaves], inputs.wood, params.ground_z_m)[0]
     table = sensors.read_local(inputs.sensors)
     advised = json.read(inputs.model) if inputs.model else {}
     print(f"variant {params.variant}, {len(table)} sensors")

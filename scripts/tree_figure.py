@@ -3,12 +3,12 @@
 import pandas as pd
 
 from dapple.figures import style, tree
-from dapple.formats import scenes
+from dapple.scene import scene_files
 from dapple.workflow import run
 
 
 def main(snakemake):
-    scene = scenes.read([snakemake.input.leaves], snakemake.input.wood)[0]
+    scene = scene_files.read([snakemake.input.leaves], snakemake.input.wood)[0]
     sensors = pd.read_csv(snakemake.input.sensors)
     style.save(tree.draw(scene, sensors=sensors), snakemake.output.figure)
 

@@ -6,13 +6,13 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from dapple.formats import clouds, json, light, meshes, scenes, shots, voxels
+from dapple.formats import clouds, json, meshes, netcdf, shots, voxel_grids
 from dapple.formats.clouds import LEAF
-from dapple.light import sensors, traced
-from dapple.stability import signals, verdict
-from dapple.stability.evidence import Evidence, count_points, no_mesh
-from dapple.stability.sensitivity import moved_light
+from dapple.light.moved_sensors import moved_light
+from dapple.scene import scene_files, sensors, traced
 from dapple.structure.subvoxel_clumping import as_estimated
+from dapple.verdict import judgement, signals
+from dapple.verdict.inputs import Evidence, count_points, no_mesh
 from dapple.workflow import run
 
 TIMES = 24
@@ -23,7 +23,7 @@ SHIFT_M = 0.1
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
     evidence = gather(inputs, params)
-    judged = verdict.judge(signals.measure(evidence), tuple(params.methods))
+    judged = judgement.judge(signals.measure(evidence), tuple(params.methods))
     json.write(snakemake.output.verdict, judged)
     print(judged["state"], {name: facts["state"] for name, facts in judged["methods"].items()})
 
@@ -39,7 +39,7 @@ def gather(inputs, params):
         "wood": meshes.read_ply(inputs.wood) if inputs.wood else no_mesh(),
         "points_per_polygon": _points_per_polygon(cloud, leaves, params.polygon_voxel_m),
         "voxels": {
-            Path(path).parent.name: as_estimated(voxels.read(path)) for path in inputs.voxels
+            Path(path).parent.name: as_estimated(voxel_grids.read(path)) for path in inputs.voxels
         },
         "shift_m": SHIFT_M,
     }
@@ -55,16 +55,16 @@ def _points_per_polygon(cloud, leaves, voxel_size_m):
 
 def _lit(inputs, params):
     """Light at some times, at the sensors and beside them."""
-    sky = light.read(inputs.sky)
+    sky = netcdf.read(inputs.sky)
     at = np.unique(np.linspace(0, sky.sizes["time"] - 1, TIMES).round().astype(int))
     sky = sky.isel(time=at)
     places = sensors.read_local(inputs.sensors)[["x_m", "y_m", "z_m"]].to_numpy()
     lit, moved = {}, {}
     for path in inputs.light:
         name = Path(path).stem
-        lit[name] = light.read(path).isel(time=at)
+        lit[name] = netcdf.read(path).isel(time=at)
         grid = [file for file in inputs.voxels if Path(file).parent.name == name]
-        found = scenes.read(grid or inputs.leaves, inputs.wood, params.ground_z_m)
+        found = scene_files.read(grid or inputs.leaves, inputs.wood, params.ground_z_m)
         moved[name] = moved_light(
             (traced.load(scene, params.variant) for scene in found),
             places,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dapple.formats import clouds, shots, voxels
+from dapple.formats import clouds, shots, voxel_grids
 from dapple.structure import subvoxel_clumping
 from dapple.structure.returns import kinds_by_place
 from dapple.structure.voxels import Grid, plant_area_density
@@ -34,8 +34,8 @@ def main(snakemake):
             kinds=kinds,
             **correction,
         )
-    voxels.write(snakemake.output.voxels, density)
-    voxels.write_vox(snakemake.output.amapvox, density)
+    voxel_grids.write(snakemake.output.voxels, density)
+    voxel_grids.write_vox(snakemake.output.amapvox, density)
 
 
 if __name__ == "__main__":

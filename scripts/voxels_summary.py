@@ -1,6 +1,6 @@
 """Areas in voxels, and of the wood that stands in them."""
 
-from dapple.formats import json, meshes, voxels
+from dapple.formats import json, meshes, voxel_grids
 from dapple.structure.summary import of_voxels
 from dapple.workflow import run
 
@@ -9,7 +9,7 @@ def main(snakemake):
     inputs = snakemake.input
     wood = meshes.read_ply(inputs.wood) if inputs.wood else None
     truth = json.read(inputs.truth) if inputs.truth else None
-    json.write(snakemake.output.summary, of_voxels(voxels.read(inputs.voxels), wood, truth))
+    json.write(snakemake.output.summary, of_voxels(voxel_grids.read(inputs.voxels), wood, truth))
 
 
 if __name__ == "__main__":

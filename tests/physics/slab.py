@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from dapple.light.phase import phase_function
+from dapple.scene.phase import phase_function
 
 N_ANGLES, N_AZIMUTHS, N_DOUBLINGS = 16, 180, 18
 

@@ -9,9 +9,10 @@ from dapple.errors import InputError
 from dapple.formats import rami
 from dapple.formats.meshes import Mesh
 from dapple.frames import direction_from_angles
-from dapple.light import brf, traced
-from dapple.light.phase import phase_function
-from dapple.light.scene import Optics, Scene
+from dapple.light import brf
+from dapple.scene import traced
+from dapple.scene.phase import phase_function
+from dapple.scene.surfaces import Optics, Scene
 
 CELL = np.array([[0.0, 0.0], [4.0, 4.0]])
 SUN = direction_from_angles(30.0, 0.0)

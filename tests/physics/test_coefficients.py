@@ -9,11 +9,12 @@ from dapple.errors import InputError
 from dapple.formats import rami
 from dapple.formats.meshes import Mesh
 from dapple.frames import direction_from_angles
-from dapple.light import brf, traced
-from dapple.light.scene import Optics, Scene
+from dapple.light import brf
 from dapple.light.tensor import spectral_factor
-from dapple.retrieval import coefficients, direct, image_paths
+from dapple.retrieval import coefficients, image_paths, rendered_images
 from dapple.retrieval.coefficients import Window
+from dapple.scene import traced
+from dapple.scene.surfaces import Optics, Scene
 
 SUN = direction_from_angles(40.0, 250.0)
 WINDOW = Window(0.0, 4.0, 0.2, 20, 20)
@@ -169,7 +170,7 @@ def test_north_is_up_and_shade_falls_away_from_the_sun():
     west = direction_from_angles(45.0, 90.0)  # the sun in the east: shade 2 m to the west
     seen = trace(scene, sun=west)
     bright = image(seen, rho=0.5, soil=0.2)
-    rendered = direct.Renderer(scene).render(
+    rendered = rendered_images.Renderer(scene).render(
         WINDOW, west, Optics(*(np.array([x]) for x in (800.0, 0.5, 0.0, 0.0, 0.2))),
         np.zeros(1), n_paths=16, seed=1,
     ).image[0]  # fmt: skip
@@ -186,7 +187,7 @@ def test_direct_renders_agree(of_canopy):
         ))
     )  # fmt: skip
     share = np.array([0.4, 0.3, 0.2, 0.1])
-    made = direct.Renderer(canopy()).render(
+    made = rendered_images.Renderer(canopy()).render(
         WINDOW, SUN, optics, share, n_paths=256, n_passes=4, seed=2
     )
     ours = coefficients.images(
@@ -201,7 +202,7 @@ def test_direct_renders_agree(of_canopy):
 
 
 def test_a_renderer_takes_new_colours_every_time():
-    renderer = direct.Renderer(canopy())
+    renderer = rendered_images.Renderer(canopy())
     dark, bright = (
         Optics(*(np.array([x]) for x in (800.0, *values)))
         for values in ((0.02, 0.01, 0.0, 0.05), (0.5, 0.4, 0.0, 0.4))

@@ -6,9 +6,10 @@ import pytest
 from tests.physics.slab import turbid_slab
 
 from dapple.formats.meshes import Mesh
-from dapple.light import shadow, traced
-from dapple.light.direct import sunlit
-from dapple.light.scene import Scene
+from dapple.light import rays_to_sky
+from dapple.light.visibility import sunlit
+from dapple.scene import traced
+from dapple.scene.surfaces import Scene
 
 SENSOR = np.array([[0.0, 0.0, 0.5]])
 UP = np.array([[0.0, 0.0, 1.0]])
@@ -144,7 +145,7 @@ def test_the_answer_depends_neither_on_threads_nor_on_blocks(monkeypatch):
         found = []
         for n_threads, block in ((1, 1 << 20), (2, 1 << 20), (2, 1 << 11)):
             dr.set_thread_count(n_threads)
-            monkeypatch.setattr(shadow, "RAYS_PER_KERNEL", block)
+            monkeypatch.setattr(rays_to_sky, "RAYS_PER_KERNEL", block)
             found.append(see(scene, sensors_m, directions([0.0, 0.1])))
     finally:
         dr.set_thread_count(threads)

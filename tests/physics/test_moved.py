@@ -6,9 +6,10 @@ import pytest
 import xarray as xr
 
 from dapple.formats.meshes import Mesh
-from dapple.light import series, traced
-from dapple.light.scene import Scene
-from dapple.stability.sensitivity import moved_light
+from dapple.light import series
+from dapple.light.moved_sensors import moved_light
+from dapple.scene import traced
+from dapple.scene.surfaces import Scene
 
 BEAM, SKY = 1500.0, 200.0
 SENSOR = np.array([[0.0, 0.0, 0.5]])

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from dapple import engine
-from dapple.light.mitsuba_plugins import register
 from dapple.light.patterns import cosine_hemisphere
-from dapple.light.phase import (
+from dapple.scene.mitsuba_plugins import register
+from dapple.scene.phase import (
     phase_function,
     quantile_argument,
     reflected_cumulative,

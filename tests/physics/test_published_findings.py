@@ -7,9 +7,9 @@ densely the tree was scanned: polygons grow with every beam, voxels do not.
 
 import pytest
 
-from dapple.config import Settings
+from dapple.config.settings import Settings
 from dapple.stability import outcome
-from dapple.stability.run import Chain
+from dapple.stability.chain import Chain
 from dapple.stability.stressors import Conditions
 from dapple.stability.world import Setup
 

@@ -6,12 +6,12 @@ import xarray as xr
 
 from dapple.formats.meshes import Mesh
 from dapple.frames import direction_from_angles
-from dapple.light import traced
-from dapple.light.scene import Optics, Scene
 from dapple.light.tensor import spectral_factor
 from dapple.optics.leaf import leaf_spectra
 from dapple.retrieval import coefficients, image_paths, semiless
 from dapple.retrieval.coefficients import Window
+from dapple.scene import traced
+from dapple.scene.surfaces import Optics, Scene
 
 NADIR = np.array([0.0, 0.0, 1.0])
 RHO = 0.6

@@ -6,9 +6,9 @@ import xarray as xr
 
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
-from dapple.light import shadow
-from dapple.light.scene import Scene
-from dapple.light.shadow import sky_visibility, sun_visibility
+from dapple.light import rays_to_sky
+from dapple.light.rays_to_sky import sky_visibility, sun_visibility
+from dapple.scene.surfaces import Scene
 
 UP = np.array([[0.0, 0.0, 1.0]])
 
@@ -115,7 +115,7 @@ def test_the_answer_does_not_depend_on_how_rays_are_dealt_to_kernels(monkeypatch
     points = np.random.default_rng(7).uniform(-1.0, 1.0, (7, 3)) * [1.0, 1.0, 0.0]
     way = directions(np.linspace(0.0, 60.0, 5), 20.0)
     whole = sun_visibility(scene, points, way, n_disc=8, seed=8)
-    monkeypatch.setattr(shadow, "RAYS_PER_KERNEL", 50)
+    monkeypatch.setattr(rays_to_sky, "RAYS_PER_KERNEL", 50)
     assert (sun_visibility(scene, points, way, n_disc=8, seed=8) == whole).all()
 
 

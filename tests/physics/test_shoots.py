@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from dapple.config import Settings
+from dapple.config.settings import Settings
 from dapple.formats.meshes import Mesh
-from dapple.light import mitsuba_scene
-from dapple.light.scene import Optics, Scene
 from dapple.retrieval.spectra import of_shoots
+from dapple.scene import mitsuba_scene
+from dapple.scene.surfaces import Optics, Scene
 from dapple.virtual import conifers
 
 N_RAYS = 400_000

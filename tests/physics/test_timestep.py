@@ -9,12 +9,12 @@ from scipy.special import expn
 
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
-from dapple.light import mitsuba_scene
-from dapple.light.phase import phase_function
-from dapple.light.scene import Optics, Scene, group_bands, group_flux
-from dapple.light.shadow import sun_visibility
-from dapple.light.sky import diffuse_normalisation, relative_radiance
+from dapple.light.rays_to_sky import sun_visibility
 from dapple.light.timestep import Effort, timestep
+from dapple.scene import mitsuba_scene
+from dapple.scene.phase import phase_function
+from dapple.scene.surfaces import Optics, Scene, group_bands, group_flux
+from dapple.sky.sky_radiance import diffuse_normalisation, relative_radiance
 
 BEAM, DIFFUSE = np.array([500.0, 600.0, 700.0]), np.array([90.0, 80.0, 70.0])
 CLEAR = np.array([-1.0, -0.3, 10.0, -3.0, 0.45])

@@ -8,9 +8,10 @@ from tests.physics.slab import layer, transmitted_irradiance, turbid_slab
 
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
-from dapple.light import paths, tensor, traced, transport
-from dapple.light.patches import patches
-from dapple.light.scene import Optics, Scene
+from dapple.light import paths, tensor, transport
+from dapple.scene import traced
+from dapple.scene.surfaces import Optics, Scene
+from dapple.sky.patches import patches
 
 SENSOR = np.array([[0.0, 0.0, 0.5]])
 COLUMNS = ("sky_seen", "sensor", "replicate", "patch", "orders", "count", "n_paths", "cut")

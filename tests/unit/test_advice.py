@@ -7,13 +7,15 @@ import pandas as pd
 import pytest
 import xarray as xr
 
-from dapple.formats.light import time_coordinate
+from dapple.advice import cheapest, refinements
+from dapple.advice.refinements import Effect
 from dapple.formats.meshes import Mesh
-from dapple.light import advice, choice, pilot, series, traced
-from dapple.light.advice import Effect
-from dapple.light.direct import Sunlit
-from dapple.light.pilot import Cost, Effort, Model
-from dapple.light.scene import Optics, Scene
+from dapple.formats.netcdf import time_coordinate
+from dapple.light import light_model, series
+from dapple.light.light_model import Cost, Effort, Model
+from dapple.light.visibility import Sunlit
+from dapple.scene import traced
+from dapple.scene.surfaces import Optics, Scene
 
 WAVELENGTH = np.linspace(400, 700, 7)
 OPTICS = Optics(WAVELENGTH, *(np.linspace(low, low + 0.1, 7) for low in (0.05, 0.02, 0.15, 0.1)))
@@ -44,7 +46,7 @@ def square(height_m, half_m, x_m=0.0, y_m=0.0):
 
 
 def a_pilot(minutes=(0, 60, 120), finest=None):
-    return advice.Pilot(
+    return refinements.Pilot(
         np.array([[0.0, 0.0, 0.1], [1.0, 0.0, 0.1]]),
         sky_at(list(minutes)),
         OPTICS,
@@ -60,16 +62,16 @@ def a_pilot(minutes=(0, 60, 120), finest=None):
 
 def test_times_are_at_least_a_step_apart_and_the_ends_are_among_them():
     minutes = np.arange(0, 61, 1.0)
-    assert list(pilot.thinned(minutes, 30)) == [0, 30, 60]
-    assert list(pilot.thinned(minutes, 25)) == [0, 25, 50, 60]
-    assert len(pilot.thinned(minutes, 0)) == len(pilot.thinned(minutes, 1)) == 61
+    assert list(light_model.thinned(minutes, 30)) == [0, 30, 60]
+    assert list(light_model.thinned(minutes, 25)) == [0, 25, 50, 60]
+    assert len(light_model.thinned(minutes, 0)) == len(light_model.thinned(minutes, 1)) == 61
 
 
 def test_between_known_times_the_share_of_the_sun_is_linear_and_at_them_it_is_kept():
     known, wanted = np.array([0.0, 10.0, 30.0]), np.arange(0, 31, 5.0)
     share = np.array([[[0.0, 1.0, 0.0]]])
     seen = Sunlit(share, np.zeros((1, 3)), np.array([[8, 16, 32]]))
-    between = pilot.interpolated(seen, known, wanted)
+    between = light_model.interpolated(seen, known, wanted)
     assert between.share[0, 0] == pytest.approx([0, 0.5, 1, 0.75, 0.5, 0.25, 0])
     assert between.n_rays.shape == (1, 7)
 
@@ -77,7 +79,7 @@ def test_between_known_times_the_share_of_the_sun_is_linear_and_at_them_it_is_ke
 def test_groups_of_bands_carry_all_the_light():
     sky = sky_at([0, 30])
     for bands in (1, 3):
-        fewer, optics = pilot.simplified(sky, OPTICS, Model(bands=bands))
+        fewer, optics = light_model.simplified(sky, OPTICS, Model(bands=bands))
         assert len(optics) == fewer.sizes["band"] == bands
         assert series.open_sky_par(fewer).to_numpy() == pytest.approx(
             series.open_sky_par(sky).to_numpy()
@@ -86,10 +88,12 @@ def test_groups_of_bands_carry_all_the_light():
 
 def test_a_full_model_keeps_sky_and_spectra_as_they_are():
     sky = sky_at([0, 30])
-    kept, optics = pilot.simplified(sky, OPTICS, Model(bands=7))
+    kept, optics = light_model.simplified(sky, OPTICS, Model(bands=7))
     assert kept.identical(sky)
     assert optics is OPTICS
-    plain, black = pilot.simplified(sky, OPTICS, Model(bands=7, sky="isotropic", ground="black"))
+    plain, black = light_model.simplified(
+        sky, OPTICS, Model(bands=7, sky="isotropic", ground="black")
+    )
     assert not plain["perez"].any()
     assert not black.ground_reflectance.any()
 
@@ -101,11 +105,11 @@ def test_under_an_open_sky_no_refinement_changes_the_light():
     one = a_pilot()
     # a leaf far below the horizon's reach: the scene needs something to be traced
     scene = traced.load(Scene({"leaf": square(-0.5, 0.01, x_m=50.0)}, None, 0.0), "llvm_ad_mono")
-    effects, finest = advice.model_effects(one, scene)
+    effects, finest = refinements.model_effects(one, scene)
     assert finest.par == pytest.approx(np.tile(one.open_sky, (2, 1)), rel=1e-4)
-    assert {effect.refinement for effect in effects} == set(advice.LEVELS)
+    assert {effect.refinement for effect in effects} == set(refinements.LEVELS)
     assert max(effect.rmse_rel for effect in effects) < 1e-4
-    steps = advice.step_effects(one, scene, one.sky, seed=1)
+    steps = refinements.step_effects(one, scene, one.sky, seed=1)
     assert [effect.level for effect in steps] == [30, 10, 5, 2, 1]
     assert max(effect.rmse_rel for effect in steps) == 0
 
@@ -113,7 +117,7 @@ def test_under_an_open_sky_no_refinement_changes_the_light():
 def test_under_a_leaf_scattering_and_the_edge_of_its_shade_count():
     one = a_pilot(minutes=range(0, 181, 20))
     scene = traced.load(Scene({"leaf": square(2.0, 0.5, y_m=-1.3)}, None, 0.0), "llvm_ad_mono")
-    effects = advice.model_effects(one, scene)[0]
+    effects = refinements.model_effects(one, scene)[0]
     by_level = {(effect.refinement, effect.level): effect for effect in effects}
     # light that is left out is missing
     assert by_level["max_orders", 0].bias_rel < 0
@@ -121,11 +125,13 @@ def test_under_a_leaf_scattering_and_the_edge_of_its_shade_count():
     assert by_level["ground", "black"].bias_rel < 0
     assert by_level["bands", 3].rmse_rel < by_level["bands", 1].rmse_rel + 1e-6 < 0.01
     # each refinement ends with the finest itself
-    assert all(by_level[name, getattr(one.finest, name)].rmse_rel == 0 for name in advice.LEVELS)
-    assert all(set(effect.parts) == set(pilot.PARTS) for effect in effects)
+    assert all(
+        by_level[name, getattr(one.finest, name)].rmse_rel == 0 for name in refinements.LEVELS
+    )
+    assert all(set(effect.parts) == set(light_model.PARTS) for effect in effects)
     assert all(effect.cost.wall_s > 0 for effect in effects)
     # shade that moves over the sensor is missed by long steps
-    steps = advice.step_effects(one, scene, one.sky, seed=1)
+    steps = refinements.step_effects(one, scene, one.sky, seed=1)
     assert steps[0].rmse_rel > steps[-2].rmse_rel > steps[-1].rmse_rel == 0
 
 
@@ -156,11 +162,11 @@ EFFECTS = [
     Effect("step_min", 10, 0.15, 0.0, 0.0, {"direct": Cost(0.3, 0.3)}),
     Effect("step_min", 1, 0.0, 0.0, 0.0, {"direct": Cost(3.0, 3.0)}),
 ]
-SAME_SIZE = choice.Scale(1.0, 1.0, 1.0)
+SAME_SIZE = cheapest.Scale(1.0, 1.0, 1.0)
 
 
 def chosen(tolerance, measure=lambda model: 0.0):
-    return choice.choose(EFFECTS, FINEST, tolerance=tolerance, scale=SAME_SIZE, measure=measure)
+    return cheapest.choose(EFFECTS, FINEST, tolerance=tolerance, scale=SAME_SIZE, measure=measure)
 
 
 def test_the_cheapest_model_whose_effects_add_up_to_the_tolerance_is_chosen():
@@ -189,11 +195,11 @@ def test_effects_that_add_up_worse_than_one_by_one_are_refused():
 
 
 def test_the_run_costs_as_much_more_as_it_has_sensors_and_times():
-    scale = choice.Scale.between((10, 5), (100, 50))
-    cost = choice.predicted(EFFECTS, FINEST, FINEST, scale)
+    scale = cheapest.Scale.between((10, 5), (100, 50))
+    cost = cheapest.predicted(EFFECTS, FINEST, FINEST, scale)
     # shadow rays and products grow with both, paths with sensors alone
     assert cost.wall_s == pytest.approx(100 * 10 + 10 * 20 + 100 * 1)
-    cheaper = choice.predicted(EFFECTS, FINEST, replace(FINEST, sun="point", step_min=30), scale)
+    cheaper = cheapest.predicted(EFFECTS, FINEST, replace(FINEST, sun="point", step_min=30), scale)
     assert cheaper.wall_s == pytest.approx(100 * 10 * 0.1 / 3 + 10 * 20 + 100 * 1)
 
 
@@ -203,8 +209,8 @@ def test_noise_is_not_taken_for_an_effect():
 
 
 def test_the_file_holds_plain_numbers_of_a_few_digits():
-    rows = advice.rounded(advice.rows(EFFECTS[:1]))
+    rows = refinements.rounded(refinements.rows(EFFECTS[:1]))
     assert rows["sun"][0]["level"] == "point"
     assert rows["sun"][0]["wall_s"] == 22.0
-    assert advice.rounded({"a": [np.float64(0.123456)], "b": 12}) == {"a": [0.1235], "b": 12}
-    assert type(advice.rounded(np.float64(1.0))) is float
+    assert refinements.rounded({"a": [np.float64(0.123456)], "b": 12}) == {"a": [0.1235], "b": 12}
+    assert type(refinements.rounded(np.float64(1.0))) is float

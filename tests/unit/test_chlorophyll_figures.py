@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dapple.figures import chlorophyll
+from dapple.figures import chlorophyll_maps
 
 MODELS, MASKS, NETWORKS = ("collision_orders", "prosail"), ("sunlit", "all"), ("robust",)
 
@@ -30,7 +30,7 @@ PAIR = {"truth_ug_cm2": (10, 70), "predicted_ug_cm2": (10, 70)}
 @pytest.mark.parametrize("draw", ["simulated", "field"])
 def test_every_model_and_mask_has_a_panel_with_its_numbers(draw):
     own = table(30, **PAIR, low_ug_cm2=(0, 20), high_ug_cm2=(60, 80))
-    figure = getattr(chlorophyll, draw)(own, table(1, **SCORES))
+    figure = getattr(chlorophyll_maps, draw)(own, table(1, **SCORES))
     panels = [axes for axes in figure.axes if "pixels" in axes.get_title("left")]
     assert len(panels) == 4
     assert all("RMSE" in axes.texts[0].get_text() for axes in panels)
@@ -43,7 +43,7 @@ def test_spectra_have_a_line_for_each_kind_of_pixel_and_model():
         columns=["kind", "wavelength_nm", "mean", "deviation"],
     )
     entries = table(1, wavelength_nm=(450, 840), low=(0, 0.1), middle=(0.1, 0.2), high=(0.3, 0.4))
-    left, right = chlorophyll.spectra(pixels, entries).axes
+    left, right = chlorophyll_maps.spectra(pixels, entries).axes
     assert [text.get_text() for text in left.get_legend().texts] == ["sunlit", "shaded", "all"]
     assert len(right.get_legend().texts) == 3
 
@@ -53,7 +53,7 @@ def test_losses_are_drawn_for_every_seed():
         table(1, train_loss=(0.1, 0.2), validation_loss=(0.1, 0.2)).assign(seed=seed, epoch=epoch)
         for seed in (1, 2) for epoch in (1, 2, 3)
     ])  # fmt: skip
-    panels = chlorophyll.losses(own).axes
+    panels = chlorophyll_maps.losses(own).axes
     assert [len(axes.lines) for axes in panels] == [4] * 4
 
 
@@ -61,7 +61,7 @@ def test_the_map_lies_where_its_cells_are_and_marks_strange_ones():
     values = np.full((5, 2, 3), 30.0)
     values[4] = [[0, 0, 1], [0, np.nan, 0]]
     ring = np.array([[1.0, 1.0], [2.0, 1.0], [2.0, 2.0]])
-    figure = chlorophyll.chlorophyll_map(
+    figure = chlorophyll_maps.chlorophyll_map(
         values, cell_m=3.0, size_m=(8.0, 5.0), rings=[ring], truth=[40.0]
     )
     left, right = figure.axes[:2]

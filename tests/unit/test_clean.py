@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from dapple import programs
-from dapple.cloud import cloudcompare, pdal, voxels
+from dapple.cloud import cloudcompare, pdal, voxel_groups
 from dapple.cloud.clean import clean, thin
 from dapple.errors import EmptyCloudError, InputError
 from dapple.formats import clouds
@@ -232,8 +232,8 @@ def test_thinning_does_not_depend_on_the_order_of_the_points():
 def test_a_decimal_coordinate_on_a_face_belongs_to_the_upper_voxel():
     x_m = np.arange(-500, 500) * 0.01
     xyz_m = np.stack([x_m, np.zeros_like(x_m), np.zeros_like(x_m)], axis=1)
-    assert len(voxels.group(xyz_m, 0.01).start) == len(x_m)
-    assert len(voxels.group(xyz_m, 0.05).start) == len(x_m) / 5
+    assert len(voxel_groups.group(xyz_m, 0.01).start) == len(x_m)
+    assert len(voxel_groups.group(xyz_m, 0.05).start) == len(x_m) / 5
 
 
 def test_a_filter_that_removes_everything_is_named(tmp_path):

@@ -6,11 +6,11 @@ from datetime import UTC, datetime
 import pytest
 import yaml
 
-from dapple import config_docs
-from dapple.config import Settings, validate
+from dapple.config import docs
+from dapple.config.settings import Settings, validate
 from dapple.errors import InputError, MissingMissesError
 
-FILES = sorted(config_docs.CONFIG.glob("*.yaml"))
+FILES = sorted(docs.CONFIG.glob("*.yaml"))
 REAL_CLOUD = {
     "source": "cloud",
     "cloud": {"path": "tree.laz"},
@@ -28,27 +28,27 @@ def merged(below, above):
     return both
 
 
-@pytest.mark.parametrize("name", sorted(config_docs.pages()))
+@pytest.mark.parametrize("name", sorted(docs.pages()))
 def test_what_is_made_from_the_typed_configuration_is_in_step_with_it(name):
-    written = (config_docs.CONFIG / name).read_text()
-    assert written == config_docs.pages()[name], f"config/{name} is stale: run `{config_docs.MEND}`"
+    written = (docs.CONFIG / name).read_text()
+    assert written == docs.pages()[name], f"config/{name} is stale: run `{docs.MEND}`"
 
 
 def test_the_default_file_says_what_the_types_say():
-    default = yaml.safe_load((config_docs.CONFIG / "config.yaml").read_text())
+    default = yaml.safe_load((docs.CONFIG / "config.yaml").read_text())
     assert validate(default) == validate({}) == Settings()
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
 def test_every_configuration_is_valid_on_top_of_the_default(path):
-    default = yaml.safe_load((config_docs.CONFIG / "config.yaml").read_text())
+    default = yaml.safe_load((docs.CONFIG / "config.yaml").read_text())
     settings = validate(merged(default, yaml.safe_load(path.read_text())), path.name)
     expected = "virtual-apple" if path.stem == "config" else path.stem
     assert settings.experiment == expected
 
 
 def test_every_key_has_a_meaning_and_the_schema_refuses_others():
-    schema = json.loads(config_docs.schema())
+    schema = json.loads(docs.schema())
     for section in (schema, *schema["$defs"].values()):
         assert section["additionalProperties"] is False
         for name, key in section["properties"].items():

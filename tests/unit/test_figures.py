@@ -8,9 +8,9 @@ import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from dapple.errors import InputError
-from dapple.figures import boxplot, ground_map, raster, scatter, series, style, tree
+from dapple.figures import boxplot, daily_courses, ground_map, painter, scatter, style, tree
 from dapple.formats.meshes import Mesh
-from dapple.light.scene import Scene
+from dapple.scene.surfaces import Scene
 
 TIMES = pd.date_range("2023-08-10 10:00", periods=30, freq="min", tz="UTC")
 
@@ -105,7 +105,7 @@ def colour_at(figure, axes, x, y):
 FIGURES = {
     "tree": lambda: tree.draw(Scene({"leaf": square((0, 0, 3), 2)}), sensors=sensors()),
     "voxels": lambda: tree.draw(Scene({}, voxels()), scan_positions_m=np.array([[9.0, 0, 1.5]])),
-    "series": lambda: series.draw(
+    "series": lambda: daily_courses.draw(
         records(), ["1_1", "2_1"], timezone="Europe/Berlin", per_sensor=per_sensor()
     ),
     "boxplot": lambda: boxplot.draw(per_sensor(), overall()),
@@ -149,7 +149,7 @@ def test_each_reconstruction_keeps_its_colour_and_no_two_share_one():
 
 def test_a_painted_triangle_covers_its_area():
     corners = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]])
-    image = raster.render(corners, np.ones((1, 3)), np.zeros(2), np.ones(2), width_px=100)
+    image = painter.render(corners, np.ones((1, 3)), np.zeros(2), np.ones(2), width_px=100)
     assert image[:, :, 3].mean() == pytest.approx(0.5, abs=0.01)
     assert image[5, 5].tolist() == [1, 1, 1, 1]
     assert image[95, 95].tolist() == [0, 0, 0, 0]
@@ -161,7 +161,7 @@ def test_triangles_that_cross_are_each_in_front_on_their_side():
     rgb = np.array([[1.0, 0, 0], [0, 0, 1.0]])
     for order in ([0, 1], [1, 0]):
         corners = np.array([flat, tilted])[order]
-        image = raster.render(corners, rgb[order], np.zeros(2), np.ones(2), width_px=20)
+        image = painter.render(corners, rgb[order], np.zeros(2), np.ones(2), width_px=20)
         assert image[5, 2, :3].tolist() == [1, 0, 0]
         assert image[5, 17, :3].tolist() == [0, 0, 1]
 
@@ -212,7 +212,7 @@ def test_a_scanner_beyond_the_frame_is_marked_from_above_only_and_within_it():
 
 
 def test_series_are_drawn_at_their_hour_in_utc_and_tell_the_local_one():
-    figure = series.draw(records(), ["1_1"], timezone="Europe/Berlin")
+    figure = daily_courses.draw(records(), ["1_1"], timezone="Europe/Berlin")
     start = mpl.dates.num2date(figure.axes[0].lines[0].get_xdata(orig=False)[0])
     assert (start.hour, start.minute) == (10, 0)
     assert "UTC on 10 August 2023 (local time: UTC +2 h" in figure.get_supxlabel()
@@ -221,13 +221,13 @@ def test_series_are_drawn_at_their_hour_in_utc_and_tell_the_local_one():
 def test_no_line_crosses_missing_records():
     data = records()
     data = data[~data["time"].between(TIMES[10], TIMES[19])]
-    line = series.draw(data, ["1_1"], timezone="UTC").axes[0].lines[0]
+    line = daily_courses.draw(data, ["1_1"], timezone="UTC").axes[0].lines[0]
     assert np.isnan(line.get_ydata()).sum() == 1
     assert len(line.get_ydata()) == 21
 
 
 def test_without_records_the_simulations_are_drawn_alone():
-    figure = series.draw(records().drop(columns="measured"), ["1_1"], timezone="UTC")
+    figure = daily_courses.draw(records().drop(columns="measured"), ["1_1"], timezone="UTC")
     labels = [line.get_label() for line in figure.axes[0].lines]
     assert len(labels) == 2
     assert "measured" not in labels
@@ -235,18 +235,18 @@ def test_without_records_the_simulations_are_drawn_alone():
 
 def test_an_unknown_sensor_is_named():
     with pytest.raises(InputError, match="found 9_9; expected labels such as 1_1"):
-        series.draw(records(), ["1_1", "9_9"], timezone="UTC")
+        daily_courses.draw(records(), ["1_1", "9_9"], timezone="UTC")
 
 
 def test_components_are_the_light_that_is_not_direct():
-    figure = series.draw(records(), ["1_1"], timezone="UTC", components_of="polygons")
+    figure = daily_courses.draw(records(), ["1_1"], timezone="UTC", components_of="polygons")
     assert figure.axes[0].collections[0].get_paths()[0].vertices[:, 1].max() == pytest.approx(100)
 
 
 def test_sensors_are_chosen_from_the_worst_to_the_best():
-    chosen = series.choose_sensors(per_sensor(), reconstruction="polygons", count=2)
+    chosen = daily_courses.choose_sensors(per_sensor(), reconstruction="polygons", count=2)
     assert chosen == ["1_3", "2_1"]
-    assert series.choose_sensors(per_sensor(), reconstruction="voxels_0.2") == ["2_1", "1_1"]
+    assert daily_courses.choose_sensors(per_sensor(), reconstruction="voxels_0.2") == ["2_1", "1_1"]
 
 
 def test_a_box_has_a_point_for_every_sensor_that_has_an_r():

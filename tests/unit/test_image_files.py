@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from dapple.errors import InputError
-from dapple.formats import coefficients as files
 from dapple.formats.meshes import Mesh
-from dapple.light.scene import Scene
+from dapple.retrieval import coefficient_files as files
 from dapple.retrieval import comparison
 from dapple.retrieval.coefficients import Coefficients, Window
 from dapple.retrieval.semiless import Fitted
+from dapple.scene.surfaces import Scene
 
 WINDOW = Window(-2.5, 7.0, 0.5, 6, 8)
 

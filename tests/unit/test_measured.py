@@ -4,9 +4,9 @@ import pytest
 import xarray as xr
 
 from dapple.errors import InputError
-from dapple.formats.light import time_coordinate
-from dapple.light import measured
-from dapple.light.times import time_range
+from dapple.formats.netcdf import time_coordinate
+from dapple.stats import measured
+from dapple.times import time_range
 
 TIMES = time_range("2023-08-10 10:00", "2023-08-10 13:20", 1, "UTC")
 

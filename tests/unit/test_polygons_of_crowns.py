@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dapple.errors import InputError
-from dapple.formats import polygons
+from dapple.formats import geojson
 
 CORNER = np.array([612_000.0, 5_324_000.0])
 SQUARE = CORNER + np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
@@ -14,11 +14,11 @@ SQUARE = CORNER + np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
 
 @pytest.fixture
 def crowns():
-    return polygons.of_rings([SQUARE, SQUARE + 5], [3, 8], [31.5, 52.25], "EPSG:25832")
+    return geojson.of_rings([SQUARE, SQUARE + 5], [3, 8], [31.5, 52.25], "EPSG:25832")
 
 
 def changed(path, crowns, change):
-    polygons.write(path, crowns)
+    geojson.write(path, crowns)
     content = json.loads(path.read_text())
     change(content)
     path.write_text(json.dumps(content))
@@ -26,8 +26,8 @@ def changed(path, crowns, change):
 
 
 def test_a_file_gives_back_what_was_written(crowns, tmp_path):
-    polygons.write(tmp_path / "crowns.geojson", crowns)
-    again = polygons.read(tmp_path / "crowns.geojson")
+    geojson.write(tmp_path / "crowns.geojson", crowns)
+    again = geojson.read(tmp_path / "crowns.geojson")
     assert again.geometries == crowns.geometries
     assert again.names == ("3", "8")
     assert again.lcc_ug_cm2.tolist() == [31.5, 52.25]
@@ -40,7 +40,7 @@ def test_features_without_a_name_are_numbered(crowns, tmp_path):
         tmp_path / "a.geojson", crowns, lambda c: [f["properties"].pop("tree") for f in
                                                    c["features"]],
     )  # fmt: skip
-    assert polygons.read(path).names == ("1", "2")
+    assert geojson.read(path).names == ("1", "2")
 
 
 @pytest.mark.parametrize(
@@ -56,10 +56,10 @@ def test_features_without_a_name_are_numbered(crowns, tmp_path):
 )
 def test_what_is_wrong_is_said(crowns, tmp_path, change, message):
     with pytest.raises(InputError, match=message):
-        polygons.read(changed(tmp_path / "a.geojson", crowns, change))
+        geojson.read(changed(tmp_path / "a.geojson", crowns, change))
 
 
 def test_another_coordinate_system_is_refused(crowns):
-    polygons.require_crs(crowns, "EPSG:25832", "crowns.geojson")
+    geojson.require_crs(crowns, "EPSG:25832", "crowns.geojson")
     with pytest.raises(InputError, match="crowns in EPSG:25832; expected EPSG:25833"):
-        polygons.require_crs(crowns, "EPSG:25833", "crowns.geojson")
+        geojson.require_crs(crowns, "EPSG:25833", "crowns.geojson")

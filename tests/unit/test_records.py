@@ -6,7 +6,7 @@ import pytest
 import xarray as xr
 
 from dapple.errors import InputError
-from dapple.stats.records import pair
+from dapple.stats.pairs import pair
 
 TIMES = pd.date_range("2023-08-10 10:00", periods=3, freq="10min")
 

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from dapple.errors import InputError
-from dapple.stats.registration import register, split
+from dapple.registration.fit import register, split
 
 SENSORS_M = np.random.default_rng(7).uniform(-3, 3, (20, 2))
 BRANCHES = np.random.default_rng(8).uniform(-5, 5, (40, 3)) * [1, 1, 0.25] + [0, 0, 3.5]

@@ -3,7 +3,7 @@ import pytest
 
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
-from dapple.light import sensors
+from dapple.scene import sensors
 
 
 def leaf(z_m=2.0, side_m=0.05):

@@ -9,11 +9,11 @@ import xarray as xr
 from dapple.formats.clouds import Cloud
 from dapple.formats.meshes import Mesh
 from dapple.formats.shots import Shots
-from dapple.stability import signals, signals_light, signals_scan, signals_structure
-from dapple.stability.catalogue import ABSENT, OF_RECORDS, SIGNALS
-from dapple.stability.evidence import Evidence, count_points, no_mesh
 from dapple.structure.polygons import reconstruct
 from dapple.structure.voxels import CAPPED
+from dapple.verdict import signals, signals_light, signals_scan, signals_structure
+from dapple.verdict.inputs import Evidence, count_points, no_mesh
+from dapple.verdict.signal_meanings import ABSENT, OF_RECORDS, SIGNALS
 
 DIMS = ("x", "y", "z")
 

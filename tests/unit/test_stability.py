@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 
 from dapple.errors import InputError
-from dapple.stability import figures, outcome, thresholds
+from dapple.figures import stability_map
+from dapple.stability import outcome, thresholds
 
 
 def runs(values: dict, stressor="wind", reconstruction="polygons", harmless=0.0, seeds=3):
@@ -117,9 +118,9 @@ def test_figures_show_a_map_with_gaps_and_failures():
         ]
         + [runs({-3.0: (0.7, 0.2), 0.0: (0.9, 0.1)}, stressor="reflectance_drift")]
     )
-    figure = figures.heat_map(points)
+    figure = stability_map.heat_map(points)
     texts = [text.get_text() for ax in figure.axes for text in ax.texts]
     assert "0.40 ✕" in texts
     assert "none ✕" in texts
     assert "0.90" in texts
-    assert figures.curves(points).axes[0].get_legend()
+    assert stability_map.curves(points).axes[0].get_legend()

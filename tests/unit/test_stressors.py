@@ -8,9 +8,9 @@ import pytest
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
 from dapple.formats.shots import Shots
-from dapple.light.sun import position
+from dapple.sky.sun import position
 from dapple.stability import stressors, world
-from dapple.stability.run import Chain, true_conditions
+from dapple.stability.chain import Chain, true_conditions
 from dapple.stability.stressors import STRESSORS, UNDISTURBED, Conditions
 from dapple.stability.world import Setup
 from dapple.virtual.plants import apple_tree

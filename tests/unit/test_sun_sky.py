@@ -4,13 +4,13 @@ import pvlib
 import pytest
 
 from dapple.errors import InputError
-from dapple.formats import light as files
-from dapple.light import sky, sun
-from dapple.light.patches import SUBDIVISIONS, patches
-from dapple.light.spectrum import par_spectrum
-from dapple.light.times import label, parse, time_range, utc
+from dapple.formats import netcdf as files
 from dapple.optics.bands import par_bands
 from dapple.optics.surfaces import scene_optics
+from dapple.sky import sky_radiance, sun
+from dapple.sky.patches import SUBDIVISIONS, patches
+from dapple.sky.spectrum import par_spectrum
+from dapple.times import label, parse, time_range, utc
 
 FREIBURG = sun.Site(48.0009, 7.8003, 230.0)
 AFTERNOON = time_range("2023-08-10 12:10", "2023-08-10 18:50", 10, "Europe/Berlin")
@@ -25,7 +25,7 @@ def radiation_table(tmp_path, text):
 
 def day(model="perez"):
     times = time_range("2023-08-10 03:00", "2023-08-10 21:00", 30, "UTC")
-    return sky.sky_dataset(times, FREIBURG, sun.clear_sky(times, FREIBURG), model=model)
+    return sky_radiance.sky_dataset(times, FREIBURG, sun.clear_sky(times, FREIBURG), model=model)
 
 
 # --- time ---------------------------------------------------------------------------------
@@ -133,7 +133,7 @@ def test_the_turbidity_climatology_is_hazier_in_summer_than_in_winter():
 
 def test_at_night_there_is_no_light_and_no_error():
     radiation = sun.clear_sky(NIGHT, FREIBURG)
-    dataset = sky.sky_dataset(NIGHT, FREIBURG, radiation)
+    dataset = sky_radiance.sky_dataset(NIGHT, FREIBURG, radiation)
     assert (radiation.to_numpy() == 0).all()
     for name in ("beam_normal_umol_m2_s", "diffuse_horizontal_umol_m2_s", "perez", "ghi_w_m2"):
         assert (dataset[name].to_numpy() == 0).all()
@@ -258,8 +258,8 @@ def test_a_blue_sky_is_bluer_than_the_sun_and_an_overcast_sky_is_not():
 
 
 def test_an_isotropic_sky_of_radiance_one_gives_a_horizontal_irradiance_of_pi():
-    assert sky.diffuse_normalisation(np.zeros(5), 35.0) == pytest.approx(np.pi, rel=1e-9)
-    radiance = sky.relative_radiance(
+    assert sky_radiance.diffuse_normalisation(np.zeros(5), 35.0) == pytest.approx(np.pi, rel=1e-9)
+    radiance = sky_radiance.relative_radiance(
         np.zeros(5), 35.0, 180.0, [0.0, 60.0, 89.0], [0.0, 10.0, 300.0]
     )
     assert (radiance == 1).all()
@@ -268,7 +268,9 @@ def test_an_isotropic_sky_of_radiance_one_gives_a_horizontal_irradiance_of_pi():
 def test_the_cos_squared_term_around_a_zenith_sun_integrates_in_closed_form():
     # L = 1 + e cos²θ gives π + e π / 2.
     coefficients = np.array([0.0, 0.0, 0.0, 0.0, 0.8])
-    assert sky.diffuse_normalisation(coefficients, 0.0) == pytest.approx(1.4 * np.pi, rel=1e-6)
+    assert sky_radiance.diffuse_normalisation(coefficients, 0.0) == pytest.approx(
+        1.4 * np.pi, rel=1e-6
+    )
 
 
 def test_the_normalisation_is_right_to_a_ten_thousandth_for_every_sky_of_a_clear_day():
@@ -279,24 +281,24 @@ def test_the_normalisation_is_right_to_a_ten_thousandth_for_every_sky_of_a_clear
     theta = np.degrees(np.arcsin(np.sqrt((np.arange(fine) + 0.5) / fine)))[:, np.newaxis]
     phi = 360.0 * (np.arange(fine) + 0.5) / fine
     for c, z, got in zip(
-        coefficients, zenith, sky.diffuse_normalisation(coefficients, zenith), strict=True
+        coefficients, zenith, sky_radiance.diffuse_normalisation(coefficients, zenith), strict=True
     ):
-        brute = np.pi * sky.relative_radiance(c, z, 0.0, theta, phi).mean()
+        brute = np.pi * sky_radiance.relative_radiance(c, z, 0.0, theta, phi).mean()
         assert got == pytest.approx(brute, rel=1e-4)
 
 
 def test_a_clear_sky_is_brightest_around_the_sun_and_an_overcast_sky_overhead():
     zenith, outside = np.array([50.0]), np.array([1330.0])
     angles = np.linspace(0.0, 85.0, 18)
-    clear = sky.perez_coefficients(zenith, np.array([850.0]), np.array([80.0]), outside)
-    overcast = sky.perez_coefficients(zenith, np.array([0.0]), np.array([200.0]), outside)
+    clear = sky_radiance.perez_coefficients(zenith, np.array([850.0]), np.array([80.0]), outside)
+    overcast = sky_radiance.perez_coefficients(zenith, np.array([0.0]), np.array([200.0]), outside)
     towards, away = (
-        sky.relative_radiance(clear, zenith, [180.0], angles, np.full(18, azimuth))[0]
+        sky_radiance.relative_radiance(clear, zenith, [180.0], angles, np.full(18, azimuth))[0]
         for azimuth in (180.0, 0.0)
     )
     assert angles[towards.argmax()] == 50.0
     assert (towards[5:] > away[5:]).all()
-    dome = sky.relative_radiance(overcast, zenith, [180.0], angles, np.full(18, 90.0))[0]
+    dome = sky_radiance.relative_radiance(overcast, zenith, [180.0], angles, np.full(18, 90.0))[0]
     assert (np.diff(dome) < 0).all()
     # The standard overcast sky of the CIE, the extreme, is three times as bright overhead.
     assert 1.3 < dome[0] / dome[-1] < 3
@@ -307,10 +309,12 @@ def test_no_sky_is_ever_negative_or_dark():
     n = 3000
     zenith = rng.uniform(0, 89.9, n)
     beam, diffuse = rng.uniform(0, 1000, n) * (rng.random(n) > 0.2), rng.uniform(1, 500, n)
-    coefficients = sky.perez_coefficients(zenith, beam, diffuse, np.full(n, 1350.0))
+    coefficients = sky_radiance.perez_coefficients(zenith, beam, diffuse, np.full(n, 1350.0))
     angles, turn = np.meshgrid([0.0, 30.0, 60.0, 85.0], [0.0, 90.0, 180.0])
-    assert (sky.relative_radiance(coefficients, zenith, np.zeros(n), angles, turn) > 0).all()
-    assert (sky.diffuse_normalisation(coefficients, zenith) > 0.1).all()
+    assert (
+        sky_radiance.relative_radiance(coefficients, zenith, np.zeros(n), angles, turn) > 0
+    ).all()
+    assert (sky_radiance.diffuse_normalisation(coefficients, zenith) > 0.1).all()
 
 
 def test_an_isotropic_day_differs_from_a_perez_day_only_in_the_distribution():
@@ -369,7 +373,7 @@ def test_only_known_subdivisions_exist():
 def test_patch_radiances_add_up_to_a_horizontal_irradiance_of_one(n):
     dataset = day()
     sun_angles = dataset["sun_zenith_deg"].to_numpy(), dataset["sun_azimuth_deg"].to_numpy()
-    radiance = sky.patch_radiance(dataset["perez"].to_numpy(), *sun_angles, patches(n))
+    radiance = sky_radiance.patch_radiance(dataset["perez"].to_numpy(), *sun_angles, patches(n))
     assert radiance @ patches(n).projected_solid_angle_sr == pytest.approx(1.0)
     assert (radiance >= 0).all()
     if n == 1:
@@ -382,7 +386,7 @@ def test_the_brightest_patch_of_a_clear_sky_holds_the_sun():
     to_sun = np.array(
         [np.sin(zenith) * np.sin(azimuth), np.sin(zenith) * np.cos(azimuth), np.cos(zenith)]
     )
-    radiance = sky.patch_radiance(
+    radiance = sky_radiance.patch_radiance(
         dataset["perez"].to_numpy()[np.newaxis],
         dataset["sun_zenith_deg"].to_numpy()[np.newaxis],
         dataset["sun_azimuth_deg"].to_numpy()[np.newaxis],

@@ -6,7 +6,7 @@ import pytest
 from dapple.errors import InputError
 from dapple.survey import checks, correction, designs, fill, hemisphere, plan, shadow
 from dapple.survey.hemisphere import Beams, Hemisphere, returns
-from dapple.survey.reach import HIT, PASSED, UNSEEN, Reach, attribute
+from dapple.survey.voxel_status import HIT, PASSED, UNSEEN, Reach, attribute
 from dapple.virtual import stands
 
 

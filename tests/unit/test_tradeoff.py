@@ -5,9 +5,9 @@ import re
 import numpy as np
 import pytest
 
+from dapple.advice import tradeoff
+from dapple.figures import pareto_chart as chart
 from dapple.figures import style
-from dapple.figures import tradeoff as chart
-from dapple.stats import tradeoff
 
 
 def row(cost, error, **facts):

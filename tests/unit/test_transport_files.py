@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from dapple.errors import InputError
-from dapple.formats import transport as files
-from dapple.light.direct import Sunlit
+from dapple.light import transport_files as files
 from dapple.light.tensor import Transport
+from dapple.light.visibility import Sunlit
 
 
 def traced(rows=50):

@@ -7,10 +7,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dapple.figures import page
-from dapple.stability import training, verdict
-from dapple.stability.catalogue import OF_RECORDS, SIGNALS
-from dapple.stability.suspicion import MOST, suspicion
+from dapple.figures import report
+from dapple.verdict import fitting, judgement
+from dapple.verdict.departure import MOST, suspicion
+from dapple.verdict.signal_meanings import OF_RECORDS, SIGNALS
 
 MOVES = (0.0, 0.2, 0.4, 1.6, 2.0)
 METHODS = ("polygons", "voxels_1.0")
@@ -64,31 +64,31 @@ def points(**columns):
 
 
 def test_a_failure_has_lost_a_fifth_of_r_or_doubled_its_error():
-    found = training.failures(points(r=[0.9, 0.73, 0.71, 0.9], rmse_rel=[0.1, 0.19, 0.1, 0.21]))
+    found = fitting.failures(points(r=[0.9, 0.73, 0.71, 0.9], rmse_rel=[0.1, 0.19, 0.1, 0.21]))
     assert found.tolist() == [False, False, True, True]
 
 
 def test_a_method_that_could_not_run_has_failed_and_light_without_variation_has_not():
     ran = points(r=[0.9, np.nan, np.nan], rmse_rel=[0.1, np.nan, 0.1])
     ran["failed"] = ["", "no leaf points", np.nan]
-    assert training.failures(ran).tolist() == [False, True, False]
+    assert fitting.failures(ran).tolist() == [False, True, False]
 
 
 def test_each_world_is_compared_with_itself():
     two = pd.concat([points(r=[0.9, 0.7], rmse_rel=0.1), points(r=[0.7, 0.7], rmse_rel=0.1)])
     two["seed"] = [1, 1, 2, 2]
-    assert training.failures(two).tolist() == [False, True, False, False]
+    assert fitting.failures(two).tolist() == [False, True, False, False]
 
 
 def test_the_undisturbed_run_that_stressors_share_counts_once():
-    runs = training.prepared(stress(USUAL))
+    runs = fitting.prepared(stress(USUAL))
     assert len(runs[runs["harmless"]]) == 6 * len(METHODS)
     assert len(runs[~runs["harmless"]]) == len(USUAL) * 6 * 4 * len(METHODS)
 
 
 def test_all_methods_of_a_run_are_in_the_same_half():
-    runs = training.prepared(stress(USUAL))
-    half = training.first_half(runs)
+    runs = fitting.prepared(stress(USUAL))
+    half = fitting.first_half(runs)
     assert 0.4 < half.mean() < 0.6
     sides = runs.assign(half=half).groupby(["stressor", "level", "seed"])["half"].nunique()
     assert (sides == 1).all()
@@ -108,14 +108,14 @@ def test_only_what_is_worse_than_usual_is_suspicious():
 
 
 def test_no_weight_calls_off_an_alarm():
-    models = training.fit(stress(USUAL))
+    models = fitting.fit(stress(USUAL))
     for model in models.values():
         assert all(facts["weight"] > 0 for facts in model["signals"].values())
         assert set(USUAL.values()) <= set(model["signals"])
 
 
 def test_failures_that_signals_foretell_are_found_in_runs_that_were_not_fitted_to():
-    found = training.validate(stress(USUAL))["halves"]
+    found = fitting.validate(stress(USUAL))["halves"]
     assert found["detection"] >= 0.85
     assert found["false_alarms"] <= 0.15
 
@@ -130,8 +130,8 @@ def test_trouble_of_a_kind_that_was_never_seen_is_found_by_a_signal_that_others_
     alarm = np.zeros(len(runs), bool)
     for stressor in ("more holes", "noise", "doubled"):
         own = (runs["stressor"] == stressor).to_numpy()
-        alarm[own] = training.flagged(runs[own], training.fit(runs[~own]))
-    failed = training.failures(runs)
+        alarm[own] = fitting.flagged(runs[own], fitting.fit(runs[~own]))
+    failed = fitting.failures(runs)
     found = runs.assign(alarm=alarm)[failed].groupby("stressor")["alarm"].mean()
     assert found["more holes"] == 1
     assert found["noise"] > 0.9
@@ -140,8 +140,8 @@ def test_trouble_of_a_kind_that_was_never_seen_is_found_by_a_signal_that_others_
 
 def test_what_leaves_no_trace_is_found_with_records_alone():
     runs = stress(USUAL | {"clock_offset": "clock_lag_min", "sensor_position": "misplaced_share"})
-    without = training.validate(runs)["halves"]
-    found = training.validate(runs, with_records=True)["halves"]
+    without = fitting.validate(runs)["halves"]
+    found = fitting.validate(runs, with_records=True)["halves"]
     assert without["detection"] < 0.82 < 0.9 <= found["detection"]
     assert without["detection_traced"] >= 0.85
 
@@ -149,13 +149,13 @@ def test_what_leaves_no_trace_is_found_with_records_alone():
 def test_signals_that_tell_nothing_raise_few_alarms():
     runs = stress(USUAL)
     runs[list(SIGNALS)] = np.random.default_rng(3).normal(0, 1, (len(runs), len(SIGNALS)))
-    assert training.validate(runs)["halves"]["false_alarms"] < 0.4
+    assert fitting.validate(runs)["halves"]["false_alarms"] < 0.4
 
 
 def test_flags_of_either_half_come_from_the_other():
     runs = stress(USUAL)
-    alarm = training.cross_flagged(runs)
-    failed = training.failures(runs).to_numpy()
+    alarm = fitting.cross_flagged(runs)
+    failed = fitting.failures(runs).to_numpy()
     assert alarm[failed].mean() > 0.85
     assert alarm[~failed].mean() < 0.15
 
@@ -169,25 +169,25 @@ def usual_signals(**changed):
 
 @pytest.fixture(scope="module")
 def models():
-    return training.fit(stress(USUAL))
+    return fitting.fit(stress(USUAL))
 
 
 def test_a_run_as_usual_is_green_and_a_bad_one_red_with_the_signal_that_speaks_most(models):
-    assert verdict.judge(usual_signals(), METHODS, models)["state"] == "green"
-    bad = verdict.judge(usual_signals(noise_share=3.0), METHODS, models)
+    assert judgement.judge(usual_signals(), METHODS, models)["state"] == "green"
+    bad = judgement.judge(usual_signals(noise_share=3.0), METHODS, models)
     assert bad["state"] == "red"
     reason = bad["methods"]["polygons"]["reasons"][0]
     assert reason["signal"] == "noise_share"
     assert "300%" in reason["text"]
     assert reason["usual"] == pytest.approx(1, abs=0.1)
     assert not reason["is_beyond"]
-    assert verdict.judge(usual_signals(noise_share=30.0), METHODS, models)["methods"]["polygons"][
+    assert judgement.judge(usual_signals(noise_share=30.0), METHODS, models)["methods"]["polygons"][
         "reasons"
     ][0]["is_beyond"]
 
 
 def test_what_cannot_be_known_is_never_green(models):
-    blind = verdict.judge(
+    blind = judgement.judge(
         usual_signals(unknown_share=math.nan, shots_per_voxel=math.nan), METHODS, models
     )
     assert blind["state"] == "amber"
@@ -196,21 +196,21 @@ def test_what_cannot_be_known_is_never_green(models):
 
 def test_a_run_is_as_good_as_its_best_method(models):
     careless = models["voxels_1.0"] | {"amber": -9.0, "red": -9.0}
-    judged = verdict.judge(usual_signals(), METHODS, models | {"voxels_1.0": careless})
+    judged = judgement.judge(usual_signals(), METHODS, models | {"voxels_1.0": careless})
     assert judged["methods"]["voxels_1.0"]["state"] == "red"
     assert judged["state"] == "green"
 
 
 def test_models_are_stored_with_their_rates_and_judge_as_before(tmp_path, models):
     path = tmp_path / "model.json"
-    stored = verdict.store(path, stress(USUAL))
-    assert verdict.load(path) == json.loads(json.dumps(models))
+    stored = judgement.store(path, stress(USUAL))
+    assert judgement.load(path) == json.loads(json.dumps(models))
     assert set(stored["scan"]["rates"]) == {"halves", "unseen_stressor", "by_method", "by_stressor"}
 
 
 def test_the_models_that_come_along_judge_every_method_by_known_signals():
     for with_records in (False, True):
-        models = verdict.load(with_records=with_records)
+        models = judgement.load(with_records=with_records)
         assert {"polygons", "voxels_0.2", "voxels_1.0"} <= set(models)
         for model in models.values():
             assert set(model["signals"]) <= set(SIGNALS)
@@ -218,7 +218,7 @@ def test_the_models_that_come_along_judge_every_method_by_known_signals():
 
 
 def test_the_models_that_come_along_keep_what_was_promised_on_unseen_runs():
-    rates = json.loads(verdict.MODEL.read_text())["records"]["rates"]["halves"]
+    rates = json.loads(judgement.MODEL.read_text())["records"]["rates"]["halves"]
     assert rates["detection"] >= 0.85
     assert rates["false_alarms"] <= 0.15
 
@@ -229,12 +229,12 @@ def test_the_models_that_come_along_keep_what_was_promised_on_unseen_runs():
 def test_the_page_opens_with_the_verdict_its_reasons_and_remedies(tmp_path, models):
     signals = usual_signals(noise_share=3.0)
     (tmp_path / "structure").mkdir()
-    judged = verdict.judge(signals, METHODS, models)
+    judged = judgement.judge(signals, METHODS, models)
     (tmp_path / "verdict.json").write_text(json.dumps(judged))
-    written = page.build("some <tree>", tmp_path)
+    written = report.build("some <tree>", tmp_path)
     assert written.index("Verdict") < written.index("Structure")
     assert "the noise filter took 300% of the returns" in written
     assert SIGNALS["noise_share"].help in written
     assert "some &lt;tree&gt;" in written
     (tmp_path / "verdict.json").unlink()
-    assert "Verdict" not in page.build("x", tmp_path)
+    assert "Verdict" not in report.build("x", tmp_path)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from dapple.errors import InputError, MissingMissesError
-from dapple.formats import voxels as files
+from dapple.formats import voxel_grids as files
 from dapple.formats.meshes import Mesh
 from dapple.formats.shots import Shots
 from dapple.structure import summary

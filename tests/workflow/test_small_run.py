@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 import yaml
 
-from dapple.config import validate
+from dapple.config.settings import validate
 
 RECONSTRUCTIONS = ["polygons", "voxels_0.2", "voxels_1.0", "truth"]
 N_SENSORS, N_TIMES = 6, 6

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from sklearn.mixture import GaussianMixture
 
-from dapple.cloud import branches, eigenvalues, voxels
+from dapple.cloud import branches, eigenvalues, voxel_groups
 from dapple.errors import EmptyCloudError, InputError
 from dapple.formats.clouds import LEAF, WOOD
 
@@ -245,7 +245,7 @@ def majority(xyz_m: np.ndarray, is_leaf: np.ndarray, voxel_size_m: float = 0.05)
     """
     if len(xyz_m) == 0:
         return np.zeros(0, bool)
-    groups = voxels.group(xyz_m, voxel_size_m)
+    groups = voxel_groups.group(xyz_m, voxel_size_m)
     leaf_wins = 2 * groups.total(np.asarray(is_leaf)) >= groups.size
     return leaf_wins[groups.voxel_of_point]
 
@@ -255,7 +255,7 @@ def _nodes(xyz_m: np.ndarray, min_size_m: float) -> tuple[np.ndarray, np.ndarray
     some = xyz_m[:: max(1, len(xyz_m) // 20_000)]
     distance, _ = cKDTree(xyz_m).query(some, 2)
     size_m = max(min_size_m, float(np.median(distance[:, 1])))
-    groups = voxels.group(xyz_m, size_m)
+    groups = voxel_groups.group(xyz_m, size_m)
     return groups.total(xyz_m) / groups.size[:, None], groups.voxel_of_point, size_m
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from dapple.cloud import cloudcompare as cc
 from dapple.cloud import pdal as pdal_program
-from dapple.cloud import voxels
+from dapple.cloud import voxel_groups
 from dapple.errors import EmptyCloudError, InputError
 from dapple.formats import clouds
 from dapple.formats.cloud_raw import attribute_name
@@ -170,7 +170,7 @@ def thin(cloud: Cloud, voxel_size_m: float) -> Cloud:
         of `Reflectance` the mean of the decibels, not of the power; NaN does not count, whole
         numbers are rounded. `CATEGORIES` take the most frequent value, the smallest of equals.
     """
-    groups = voxels.group(cloud.xyz_m, voxel_size_m)
+    groups = voxel_groups.group(cloud.xyz_m, voxel_size_m)
     attributes = {
         name: (_most_frequent if name in CATEGORIES else _mean)(values, groups)
         for name, values in cloud.attributes.items()
@@ -179,7 +179,7 @@ def thin(cloud: Cloud, voxel_size_m: float) -> Cloud:
     return Cloud(xyz_m, cloud.origin_m, attributes)
 
 
-def _mean(values: np.ndarray, groups: voxels.Groups) -> np.ndarray:
+def _mean(values: np.ndarray, groups: voxel_groups.Groups) -> np.ndarray:
     known = np.isfinite(values)
     n_known = groups.total(known)
     with np.errstate(invalid="ignore"):
@@ -189,7 +189,7 @@ def _mean(values: np.ndarray, groups: voxels.Groups) -> np.ndarray:
     return mean.astype(values.dtype)
 
 
-def _most_frequent(values: np.ndarray, groups: voxels.Groups) -> np.ndarray:
+def _most_frequent(values: np.ndarray, groups: voxel_groups.Groups) -> np.ndarray:
     voxel = groups.voxel_of_point
     order = np.lexsort((values, voxel))
     value, voxel = values[order], voxel[order]

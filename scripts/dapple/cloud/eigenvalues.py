@@ -4,7 +4,7 @@ import numba
 import numpy as np
 from scipy.spatial import cKDTree
 
-from dapple.cloud import voxels
+from dapple.cloud import voxel_groups
 
 SCALES = (2.0, 3.5, 7.0)
 """Radii of the neighbourhoods in node sizes."""
@@ -97,7 +97,7 @@ def _covariance(rows: np.ndarray) -> np.ndarray:
 def _at_scale(nodes_m: np.ndarray, size_m: float, scale: float) -> np.ndarray:
     """Features at one scale, from fewer points where the scale is large."""
     radius_m = scale * size_m
-    groups = voxels.group(nodes_m, max(size_m, radius_m / 3))
+    groups = voxel_groups.group(nodes_m, max(size_m, radius_m / 3))
     spread, axes, n = shape(groups.total(nodes_m) / groups.size[:, None], radius_m)
     longest = np.maximum(spread[:, 2], 1e-9)
     columns = [

@@ -10,9 +10,9 @@ from matplotlib.colors import ListedColormap, Normalize, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from dapple.figures import raster, style
+from dapple.figures import painter, style
 from dapple.formats.meshes import Mesh
-from dapple.light.scene import Scene
+from dapple.scene.surfaces import Scene
 
 PANEL_IN = 4.0  # width of one view
 HAZE = 0.35
@@ -150,7 +150,7 @@ def _mesh_layer(axes: Axes, meshes: dict[str, Mesh], view: View, low, high) -> N
         haze = HAZE * (1 - np.clip(nearness, 0, 1))[:, None]
         corners.append(triangles)
         colours.append(rgb * (1 - haze) + haze)
-    image = raster.render(
+    image = painter.render(
         np.concatenate(corners),
         np.concatenate(colours),
         low[page],

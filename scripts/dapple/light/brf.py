@@ -13,9 +13,9 @@ import drjit as dr
 import numpy as np
 
 from dapple.light.paths import PLASTIC_STEPS, scatter
-from dapple.light.scene import Optics
 from dapple.light.tensor import spectral_factor
-from dapple.light.traced import TracedScene
+from dapple.scene.surfaces import Optics
+from dapple.scene.traced import TracedScene
 
 PATHS_PER_KERNEL = 1 << 19
 SUN, SKY = 0, 1

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import drjit as dr
 import numpy as np
 
-from dapple.light.traced import TracedScene
+from dapple.scene.traced import TracedScene
 
 PLASTIC_STEPS = (3242174889, 2447445414)
 """2³² over the plastic number and over its square: steps of the R2 sequence (Roberts 2018)."""

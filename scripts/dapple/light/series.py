@@ -6,13 +6,13 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from dapple.formats.light import time_coordinate, times
+from dapple.formats.netcdf import time_coordinate, times
 from dapple.frames import direction_from_angles
-from dapple.light.direct import Sunlit
-from dapple.light.patches import patches
-from dapple.light.scene import Optics
-from dapple.light.sky import patch_radiance
 from dapple.light.tensor import Transport, straight, summed_scattered, sun_radiance
+from dapple.light.visibility import Sunlit
+from dapple.scene.surfaces import Optics
+from dapple.sky.patches import patches
+from dapple.sky.sky_radiance import patch_radiance
 
 VALUES_AT_ONCE = 1 << 22
 """Bounds memory: values of sensors, replicates and times that are held together."""

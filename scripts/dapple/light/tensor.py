@@ -13,8 +13,8 @@ import numpy as np
 from scipy import sparse
 
 from dapple.frames import direction_from_angles
-from dapple.light.patches import Patches, patches
-from dapple.light.scene import Optics
+from dapple.scene.surfaces import Optics
+from dapple.sky.patches import Patches, patches
 
 NOMINAL_SUNS_DEG = ((30, 0), (30, 120), (30, 240), (60, 60), (60, 180), (60, 300))
 """Zenith and azimuth of the suns under which a pilot is judged."""

@@ -21,8 +21,8 @@ from dapple import engine
 from dapple.errors import InputError
 from dapple.frames import direction_from_angles
 from dapple.light import patterns
-from dapple.light.mitsuba_scene import RenderScene
-from dapple.light.sky import relative_radiance
+from dapple.scene.mitsuba_scene import RenderScene
+from dapple.sky.sky_radiance import relative_radiance
 from dapple.streams import stream_seed
 
 LIFT_M = 1e-3
@@ -90,7 +90,7 @@ def timestep(
     diffuse_horizontal : (b,) array
         Irradiance of the open sky on the level, per band, in the same unit.
     sky : (5,) array or callable
-        Coefficients of Perez et al. (1993) (`light.sky.relative_radiance`; zeros: isotropic), or
+        Coefficients of Perez et al. (1993) (`sky_radiance.relative_radiance`; zeros: isotropic), or
         relative radiance as a function of zenith and azimuth [deg].
     effort : Effort
     seed : int

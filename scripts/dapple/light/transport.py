@@ -9,12 +9,12 @@ from dataclasses import fields
 import numpy as np
 
 from dapple.errors import InputError
-from dapple.light.patches import patches
 from dapple.light.paths import Paths, trace
-from dapple.light.scene import Optics
-from dapple.light.shadow import sky_rays
+from dapple.light.rays_to_sky import sky_rays
 from dapple.light.tensor import Transport, nominal_error, nominal_straight_error
-from dapple.light.traced import TracedScene
+from dapple.scene.surfaces import Optics
+from dapple.scene.traced import TracedScene
+from dapple.sky.patches import patches
 from dapple.streams import stream_seed
 
 N_REPLICATES = 16

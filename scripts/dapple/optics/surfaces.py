@@ -7,8 +7,8 @@ import numpy as np
 import pandas as pd
 
 from dapple.errors import InputError
-from dapple.light.scene import Optics
 from dapple.optics.bands import band_mean, par_bands
+from dapple.scene.surfaces import Optics
 
 # Assumed, not measured: between measured branches of birch and larch (0.07 to 0.18, spectral
 # database of LESS, Qi et al. 2019) and the bark colour of the published apple tree (red 0.37,

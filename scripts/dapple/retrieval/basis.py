@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dapple.light.scene import Optics
 from dapple.light.tensor import spectral_factor
+from dapple.scene.surfaces import Optics
 
 N_NODES = 400
 LARGEST_ALBEDO, LARGEST_SOIL, LARGEST_BARK = 0.999, 0.85, 0.8

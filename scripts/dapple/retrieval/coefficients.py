@@ -18,9 +18,9 @@ from functools import cached_property
 import numpy as np
 
 from dapple.light.brf import SKY, SUN
-from dapple.light.scene import Optics
 from dapple.light.tensor import spectral_factor
 from dapple.retrieval.basis import projector
+from dapple.scene.surfaces import Optics
 
 COMBINATIONS_AT_ONCE = 1024
 """Bounds the memory of the factors of all kinds of paths."""

@@ -8,9 +8,9 @@ from scipy import sparse
 from dapple.errors import InputError
 from dapple.light import brf
 from dapple.light.paths import PLASTIC_STEPS
-from dapple.light.traced import TracedScene
 from dapple.retrieval import basis
 from dapple.retrieval.coefficients import Coefficients, Window
+from dapple.scene.traced import TracedScene
 
 START_ABOVE_M = 1.0
 """Rays start so far above the highest plant."""

@@ -7,18 +7,19 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from dapple.advice.tradeoff import rmse_rel
 from dapple.errors import InputError
 from dapple.formats.clouds import LEAF
-from dapple.formats.light import times
-from dapple.light import measured, series
+from dapple.formats.netcdf import times
+from dapple.light import series
 from dapple.light.series import Light
-from dapple.stability import signals
-from dapple.stability.evidence import Evidence, count_points, no_mesh
-from dapple.stability.methods import METHODS, size_of
-from dapple.stability.run import SHIFT_M, Chain, true_conditions
+from dapple.stability.chain import SHIFT_M, Chain, true_conditions
+from dapple.stability.reconstructions import METHODS, size_of
 from dapple.stability.stressors import Conditions, Level, Stressor
-from dapple.stats.tradeoff import rmse_rel
+from dapple.stats import measured
 from dapple.streams import stream_seed
+from dapple.verdict import signals
+from dapple.verdict.inputs import Evidence, count_points, no_mesh
 
 COLUMNS = [
     "stressor",

@@ -12,12 +12,12 @@ import xarray as xr
 from dapple.formats import shots as shot_files
 from dapple.formats.meshes import Mesh, concatenate
 from dapple.formats.shots import Shots
-from dapple.light import sensors
-from dapple.light.sky import sky_dataset
-from dapple.light.sun import Site, broadband, position
-from dapple.light.times import time_range
+from dapple.scene import sensors
+from dapple.sky.sky_radiance import sky_dataset
+from dapple.sky.sun import Site, broadband, position
 from dapple.stability.stressors import Conditions
 from dapple.streams import stream_seed
+from dapple.times import time_range
 from dapple.virtual import leaf_shapes, scanner
 from dapple.virtual.plants import apple_tree
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dapple.structure.leaf_angles import projection
-from dapple.survey.reach import HIT, UNSEEN
 from dapple.survey.shadow import in_cells
+from dapple.survey.voxel_status import HIT, UNSEEN
 
 CLASSES = ("full", "80-100", "60-80", "40-60", "20-40", "0-20")
 """Share of a cell's voxels that were hit or passed [%]."""

@@ -3,7 +3,7 @@
 import numpy as np
 
 from dapple.errors import InputError
-from dapple.survey.reach import HIT, UNSEEN
+from dapple.survey.voxel_status import HIT, UNSEEN
 
 
 def in_cells(voxels: np.ndarray, per_edge: int, reduce: str = "mean") -> np.ndarray:

@@ -16,8 +16,8 @@ from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
 from dapple.frames import direction_from_angles
 from dapple.light import patterns
-from dapple.light.mitsuba_plugins import register
-from dapple.light.mitsuba_scene import RenderScene, _looking, _mesh, _sky
+from dapple.scene.mitsuba_plugins import register
+from dapple.scene.mitsuba_scene import RenderScene, _looking, _mesh, _sky
 from dapple.streams import stream_seed
 from dapple.virtual.plot_optics import Materials
 

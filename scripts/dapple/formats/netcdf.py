@@ -1,0 +1,102 @@
+"""NetCDF of light: the sky, optical properties, and light at sensors."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from dapple.errors import InputError
+from dapple.formats.atomic import atomic
+from dapple.scene.surfaces import Optics
+from dapple.times import utc
+
+OPTICS_NAMES = {
+    "leaf_reflectance": "reflectance of leaves",
+    "leaf_transmittance": "transmittance of leaves",
+    "bark_reflectance": "reflectance of bark",
+    "ground_reflectance": "reflectance of the ground",
+}
+TIME_ENCODING = {"units": "milliseconds since 1970-01-01", "dtype": "int64"}
+
+
+def time_coordinate(times: pd.DatetimeIndex) -> tuple[str, np.ndarray, dict[str, str]]:
+    """Coordinate `time` of a dataset: UTC without a zone, which NetCDF cannot hold, and says so.
+
+    Raises
+    ------
+    InputError
+        Naive times.
+    """
+    naive = utc(times).tz_localize(None).to_numpy()
+    return "time", naive, {"long_name": "time", "time_zone": "UTC"}
+
+
+def times(dataset: xr.Dataset, where: str | Path = "light dataset") -> pd.DatetimeIndex:
+    """Times of a dataset, time-zone aware.
+
+    Raises
+    ------
+    InputError
+        The coordinate `time` does not say that it is UTC.
+    """
+    if dataset["time"].attrs.get("time_zone") != "UTC":
+        raise InputError(
+            where,
+            "a coordinate `time` without the attribute time_zone",
+            'time_zone = "UTC"',
+            "Make the coordinate with formats.light.time_coordinate.",
+        )
+    return pd.DatetimeIndex(dataset["time"].to_numpy()).tz_localize("UTC").as_unit("ns")
+
+
+def write(path: str | Path, dataset: xr.Dataset) -> None:
+    """Write a dataset as NetCDF, whole or not at all.
+
+    Every variable must carry `units` and `long_name` (ValueError otherwise).
+    """
+    bare = [
+        str(name)
+        for name, variable in dataset.data_vars.items()
+        if not {"units", "long_name"} <= variable.attrs.keys()
+    ]
+    if bare:
+        raise ValueError(f"{path}: no units or long_name on {', '.join(bare)}")
+    encoding = {"time": TIME_ENCODING} if "time" in dataset.coords else {}
+    with atomic(path) as partial:
+        dataset.to_netcdf(partial, engine="netcdf4", encoding=encoding)
+
+
+def read(path: str | Path) -> xr.Dataset:
+    """Read a dataset into memory.
+
+    Raises
+    ------
+    InputError
+        No such file, or not NetCDF.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(path, "no file", "a NetCDF file", "Run the step that makes it.")
+    try:
+        return xr.load_dataset(path, engine="netcdf4")
+    except (OSError, ValueError) as error:
+        raise InputError(
+            path, f"an unreadable file ({error})", "a NetCDF file", "Delete it and run again."
+        ) from error
+
+
+def write_optics(path: str | Path, optics: Optics) -> None:
+    """Write optical properties as NetCDF with the dimension `band`."""
+    variables = {
+        name: ("band", getattr(optics, name), {"units": "1", "long_name": text})
+        for name, text in OPTICS_NAMES.items()
+    }
+    centre = {"units": "nm", "long_name": "centre of the band"}
+    write(path, xr.Dataset(variables, {"wavelength_nm": ("band", optics.wavelength_nm, centre)}))
+
+
+def read_optics(path: str | Path) -> Optics:
+    """Read optical properties as `write_optics` writes them."""
+    dataset = read(path)
+    return Optics(**{name: dataset[name].to_numpy() for name in ("wavelength_nm", *OPTICS_NAMES)})

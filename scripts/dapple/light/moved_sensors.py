@@ -1,0 +1,73 @@
+"""Light where sensors would stand if their positions were a little wrong."""
+
+from collections.abc import Iterable
+
+import numpy as np
+import xarray as xr
+
+from dapple.light import visibility
+from dapple.light.series import level_beam, towards_sun
+from dapple.scene.traced import TracedScene
+
+
+def moved_light(
+    scenes: Iterable[TracedScene],
+    sensors_m: np.ndarray,
+    light: xr.Dataset,
+    sky: xr.Dataset,
+    *,
+    shift_m: float,
+    seed: int,
+    max_rays: int = 128,
+    tolerance: float = 0.02,
+    sun_diameter_deg: float = 0.533,
+    aperture_m: float = 0.0,
+) -> xr.Dataset:
+    """Light at sensors that are moved sideways, each in its own direction.
+
+    Only the direct beam is traced again, at both places: light from the whole sky hardly changes.
+
+    Parameters
+    ----------
+    scenes : iterable of TracedScene
+        One a placement of leaves; their mean counts.
+    sensors_m : (s, 3) float64
+        Local frame [m].
+    light : Dataset
+        Light at the sensors.
+    sky : Dataset
+        Sun and sky at the same times.
+    shift_m : float
+        How far they are moved [m].
+    seed : int
+        Chooses the directions and shifts the rays.
+    max_rays, tolerance, sun_diameter_deg, aperture_m
+        As in `direct.sunlit`.
+
+    Returns
+    -------
+    Dataset
+        Like `light`.
+    """
+    azimuth = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(sensors_m))
+    way = np.stack([np.sin(azimuth), np.cos(azimuth), np.zeros_like(azimuth)], axis=1)
+    places = np.concatenate([sensors_m, sensors_m + shift_m * way])
+    shares = [
+        visibility.sunlit(
+            scene,
+            places,
+            towards_sun(sky),
+            tolerance=tolerance,
+            max_rays=max_rays,
+            seed=seed + number,
+            sun_diameter_deg=sun_diameter_deg,
+            aperture_m=aperture_m,
+        ).share.mean(axis=0)
+        for number, scene in enumerate(scenes)
+    ]
+    here, there = np.split(np.mean(shares, axis=0), 2)
+    change = xr.DataArray((there - here) * level_beam(sky), dims=("sensor", "time"))
+    moved = light.copy()
+    for name in ("par_umol_m2_s", "par_direct_umol_m2_s"):
+        moved[name] = (light[name] + change.to_numpy()).clip(min=0)
+    return moved

@@ -1,0 +1,295 @@
+"""What a point sees of the sun's disc and of the sky, by explicit shadow rays.
+
+Meshes block; turbid voxels transmit exp(-G * integral of plant area density), marched exactly
+from voxel to voxel. Made for many points and times, as in fitting a tree to records of its shade.
+"""
+
+from collections.abc import Callable, Iterator
+
+import drjit as dr
+import numpy as np
+
+from dapple.light import patterns
+from dapple.scene import traced
+from dapple.scene.surfaces import Scene
+from dapple.scene.traced import TracedScene
+from dapple.sky.patches import Patches, patches
+
+RAYS_PER_KERNEL = 1 << 22
+"""Bounds memory: a ray takes about 100 bytes."""
+
+SunRays = Callable[[np.ndarray, int, int, int], tuple[np.ndarray, np.ndarray]]
+SkyRays = Callable[[np.ndarray, int, int, int], np.ndarray]
+
+
+def sun_rays(
+    scene: TracedScene,
+    points_m: np.ndarray,
+    sun_directions: np.ndarray,
+    *,
+    sun_diameter_deg: float,
+    aperture_m: float,
+    seed: int,
+) -> SunRays:
+    """Prepare rays from level entrances to the sun's disc.
+
+    Parameters
+    ----------
+    scene : TracedScene
+        The ground does not matter.
+    points_m : (n, 3) float64
+        Local frame [m].
+    sun_directions : (t, 3) float64
+        Unit vectors towards the middle of the sun.
+    sun_diameter_deg : float
+        Angular diameter of the disc [deg].
+    aperture_m : float
+        Diameter of the level entrance around each point; 0 is a point [m].
+    seed : int
+        Shifts the pattern differently for each pair of point and sun and each replicate.
+
+    Returns
+    -------
+    callable
+        Of pairs (m,) (point * t + sun), a number of replicates r, the first ray's number and the
+        number of rays in a replicate. It returns the sums (m, r) of what the rays see, 0 to 1
+        each, nothing below the horizon, and the sums of squares (m,).
+    """
+    mi = scene.mi
+    points, axes = (_columns(mi, vectors) for vectors in (points_m, sun_directions))
+    radius = dr.opaque(mi.Float, float(np.sin(np.radians(0.5 * sun_diameter_deg))))
+    half_aperture = dr.opaque(mi.Float, 0.5 * aperture_m)
+    n_suns, key = dr.opaque(mi.UInt32, len(sun_directions)), dr.opaque(mi.UInt32, seed)
+    dimensions = 4 if aperture_m else 2
+
+    def block(pairs, pattern, n_replicates: int, n_rays: int):
+        ray, item = _rays_of_block(mi, len(pairs), n_replicates * n_rays)
+        pair = dr.gather(mi.UInt32, mi.UInt32(pairs.astype(np.uint32)), item)
+        per_set, sets = dr.opaque(mi.UInt32, n_rays), dr.opaque(mi.UInt32, n_replicates)
+        u = _shifted(mi, pattern, ray % per_set, pair * sets + ray // per_set, key)
+        point, sun = pair // n_suns, pair % n_suns
+        axis = mi.Vector3f(*(dr.gather(mi.Float, a, sun) for a in axes))
+        start = mi.Point3f(*(dr.gather(mi.Float, a, point) for a in points))
+        x, y = _disc(u[0], u[1])
+        way = dr.normalize(mi.Frame3f(axis).to_world(mi.Vector3f(radius * x, radius * y, 1.0)))
+        if aperture_m:
+            x, y = _disc(u[2], u[3])
+            start += half_aperture * mi.Vector3f(x, y, 0.0)
+        seen = scene.transmittance(start, way, (way.z > 0) & (axis.z > 0))
+        sums, squares = (dr.block_sum(x, n_rays) for x in (seen, seen * seen))
+        dr.eval(sums, squares)
+        return (np.array(x, np.float64).reshape(-1, n_replicates) for x in (sums, squares))
+
+    def trace(pairs: np.ndarray, n_replicates: int, first: int, n_rays: int):
+        pattern = _columns(mi, patterns.kronecker(first + n_rays, dimensions)[first:])
+        sums, squares = np.empty((len(pairs), n_replicates)), np.empty(len(pairs))
+        for part in _blocks(len(pairs), n_replicates * n_rays):
+            sums[part], square = block(pairs[part], pattern, n_replicates, n_rays)
+            squares[part] = square.sum(axis=1)
+        return sums, squares
+
+    return trace
+
+
+def sky_rays(scene: TracedScene, points_m: np.ndarray, sky: Patches, *, seed: int) -> SkyRays:
+    """Prepare rays from points to the patches of the sky.
+
+    Parameters
+    ----------
+    scene : TracedScene
+        The ground does not matter.
+    points_m : (n, 3) float64
+        Local frame [m].
+    sky : Patches
+        Subdivision of the sky into p patches.
+    seed : int
+        Shifts the pattern differently for each point, replicate and patch.
+
+    Returns
+    -------
+    callable
+        Of points (m,), a number of replicates r, the first ray's number and the number of rays in
+        a patch and replicate. It returns the sums (m, r, p) of what the rays see, 0 to 1 each;
+        rays are evenly spread over a patch's projected solid angle.
+    """
+    mi = scene.mi
+    points = _columns(mi, points_m)
+    width = 2 * np.pi / np.repeat(sky.row_count, sky.row_count)
+    start = (np.arange(sky.n) - np.repeat(sky.row_start, sky.row_count) - 0.5) * width
+    low, high = (
+        np.repeat(bound**2, sky.row_count) for bound in (sky.row_sine[:-1], sky.row_sine[1:])
+    )
+    # Within a patch the squared sine of the altitude and the azimuth are even.
+    table = _columns(mi, np.stack([low, high - low, start, width], axis=1))
+    n_patches, key = dr.opaque(mi.UInt32, sky.n), dr.opaque(mi.UInt32, seed)
+
+    def block(items, point, pattern, n_rays: int):
+        ray, number = _rays_of_block(mi, len(items), n_rays)
+        item = dr.gather(mi.UInt32, mi.UInt32(items.astype(np.uint32)), number)
+        u = _shifted(mi, pattern, ray, item, key)
+        low, height, start, width = (
+            dr.gather(mi.Float, column, item % n_patches) for column in table
+        )
+        squared = dr.fma(u[0], height, low)
+        east, north = dr.sincos(dr.fma(u[1], width, start))
+        level = dr.safe_sqrt(1 - squared)
+        way = mi.Vector3f(level * east, level * north, dr.sqrt(squared))
+        point = dr.gather(mi.UInt32, mi.UInt32(point.astype(np.uint32)), number)
+        origin = mi.Point3f(*(dr.gather(mi.Float, a, point) for a in points))
+        return np.array(dr.block_sum(scene.transmittance(origin, way, way.z > 0), n_rays))
+
+    def trace(chosen: np.ndarray, n_replicates: int, first: int, n_rays: int):
+        pattern = _columns(mi, patterns.kronecker(first + n_rays, 2)[first:])
+        per_point = n_replicates * sky.n
+        items = (chosen[:, None] * per_point + np.arange(per_point)).ravel()
+        sums = np.empty(len(items), np.float32)
+        for part in _blocks(len(items), n_rays):
+            sums[part] = block(items[part], items[part] // per_point, pattern, n_rays)
+        return sums.reshape(len(chosen), n_replicates, sky.n)
+
+    return trace
+
+
+class Tracer:
+    """Shadow rays through one scene, whose acceleration structure is built once.
+
+    Parameters
+    ----------
+    scene : Scene
+        Meshes and turbid voxels; the ground does not matter.
+    variant : str
+        Of Mitsuba.
+    """
+
+    def __init__(self, scene: Scene, variant: str = "llvm_ad_rgb"):
+        self.scene = traced.load(scene, variant)
+
+    def sun_visibility(
+        self,
+        points_m: np.ndarray,
+        sun_directions: np.ndarray,
+        *,
+        n_disc: int,
+        seed: int,
+        angular_diameter_deg: float = 0.53,
+        aperture_m: float = 0.0,
+    ) -> np.ndarray:
+        """Share of the sun's disc that each point sees in each direction of the sun.
+
+        Parameters
+        ----------
+        points_m : (n, 3) array
+            Local frame [m].
+        sun_directions : (m, 3) array
+            Unit vectors towards the middle of the sun; below the horizon nothing is seen.
+        n_disc : int
+            Rays per point and direction, evenly spread over the disc.
+        seed : int
+            Turns the pattern differently for each point and direction.
+        angular_diameter_deg : float
+            Of the sun [deg].
+        aperture_m : float
+            Diameter of the level entrance around each point [m]; 0 is a point.
+
+        Returns
+        -------
+        (n, m) float32
+            0 (shade) to 1 (full sun); with turbid voxels the mean transmittance.
+        """
+        shape = len(points_m), len(sun_directions)
+        trace = sun_rays(
+            self.scene,
+            points_m,
+            sun_directions,
+            sun_diameter_deg=angular_diameter_deg,
+            aperture_m=aperture_m,
+            seed=seed,
+        )
+        seen = trace(np.arange(shape[0] * shape[1]), 1, 0, n_disc)[0] / n_disc
+        return seen.reshape(shape).astype(np.float32)
+
+    def sky_visibility(self, points_m: np.ndarray, *, n: int, seed: int) -> np.ndarray:
+        """Cosine-weighted share of the sky that each point sees: diffuse light below over above.
+
+        Parameters
+        ----------
+        points_m : (p, 3) array
+            Local frame [m].
+        n : int
+            Rays per point, with a cosine law about the zenith.
+        seed : int
+
+        Returns
+        -------
+        (p,) float32
+            1 in the open.
+        """
+        trace = sky_rays(self.scene, points_m, patches(1), seed=seed)
+        return trace(np.arange(len(points_m)), 1, 0, n)[:, 0, 0] / np.float32(n)
+
+
+def sun_visibility(
+    scene: Scene,
+    points_m: np.ndarray,
+    sun_directions: np.ndarray,
+    *,
+    n_disc: int,
+    seed: int,
+    angular_diameter_deg: float = 0.53,
+    aperture_m: float = 0.0,
+    variant: str = "llvm_ad_rgb",
+) -> np.ndarray:
+    """`Tracer.sun_visibility` for one call."""
+    return Tracer(scene, variant).sun_visibility(
+        points_m,
+        sun_directions,
+        n_disc=n_disc,
+        seed=seed,
+        angular_diameter_deg=angular_diameter_deg,
+        aperture_m=aperture_m,
+    )
+
+
+def sky_visibility(
+    scene: Scene, points_m: np.ndarray, *, n: int, seed: int, variant: str = "llvm_ad_rgb"
+) -> np.ndarray:
+    """`Tracer.sky_visibility` for one call."""
+    return Tracer(scene, variant).sky_visibility(points_m, n=n, seed=seed)
+
+
+def _columns(mi, values: np.ndarray) -> list:
+    """The columns of (n, k) numbers as Dr.Jit arrays."""
+    return [mi.Float(np.ascontiguousarray(v, np.float32)) for v in np.asarray(values, float).T]
+
+
+def _blocks(n_items: int, rays_per_item: int) -> Iterator[slice]:
+    """Ranges of items whose rays fit one kernel."""
+    step = max(1, RAYS_PER_KERNEL // rays_per_item)
+    for low in range(0, n_items, step):
+        yield slice(low, min(low + step, n_items))
+
+
+def _rays_of_block(mi, n_items: int, per_item: int):
+    """Number of each ray within its item, and the number of the item in the block."""
+    index = dr.arange(mi.UInt32, n_items * per_item)
+    rays = dr.opaque(mi.UInt32, per_item)
+    return index % rays, index // rays
+
+
+def _shifted(mi, pattern: list, ray, item, key) -> list:
+    """Pattern points with a shift that belongs to the item, whatever the block it falls in."""
+    words = mi.sample_tea_32(item, key)
+    if len(pattern) > 2:
+        words = (*words, *mi.sample_tea_32(*words))
+    points = [
+        dr.gather(mi.Float, column, ray) + mi.Float(word) * 2.0**-32
+        for column, word in zip(pattern, words, strict=True)
+    ]
+    return [point - dr.floor(point) for point in points]
+
+
+def _disc(u, v):
+    """Even points of the disc of radius 1."""
+    sine, cosine = dr.sincos(dr.two_pi * v)
+    radius = dr.sqrt(u)
+    return radius * cosine, radius * sine

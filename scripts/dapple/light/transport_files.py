@@ -1,0 +1,97 @@
+"""NetCDF of what was traced: counted paths, and the share of the sun that sensors see."""
+
+from pathlib import Path
+
+import xarray as xr
+
+from dapple.errors import InputError
+from dapple.formats.atomic import atomic
+from dapple.formats.netcdf import read as read_netcdf
+from dapple.light.tensor import Transport
+from dapple.light.visibility import Sunlit
+
+ROWS = {
+    "sensor": "index of the sensor where the paths start",
+    "replicate": "independent set of paths",
+    "patch": "sky patch in which they leave",
+    "orders": "leaf reflections, leaf transmissions, bark and ground reflections on their way",
+    "count": "paths",
+}
+SENSORS = {
+    "n_paths": "paths started from the sensor in each replicate",
+    "cut": "paths given up at max_orders, of all replicates",
+}
+SKY = "share of the sky patch that the sensor sees, weighted by the cosine"
+SUNLIT = {
+    "share": ("share of the solar disc that is seen", ("replicate", "sensor", "time")),
+    "standard_error": ("standard error of the share", ("sensor", "time")),
+    "n_rays": ("shadow rays of each replicate", ("sensor", "time")),
+}
+
+
+def write(path: str | Path, transport: Transport) -> None:
+    """Write counted paths, whole or not at all; the same counts give the same bytes."""
+    variables = {
+        name: (
+            ("row", "order") if name == "orders" else "row",
+            getattr(transport, name),
+            {"units": "1", "long_name": text},
+        )
+        for name, text in ROWS.items()
+    }
+    variables |= {
+        name: ("start", getattr(transport, name), {"units": "1", "long_name": text})
+        for name, text in SENSORS.items()
+    }
+    about = {"units": "1", "long_name": SKY}
+    variables["sky_seen"] = (("start", "set", "sky_patch"), transport.sky_seen, about)
+    _write(path, xr.Dataset(variables, attrs={"max_orders": transport.max_orders}))
+
+
+def read(path: str | Path) -> Transport:
+    """Read counted paths as `write` writes them.
+
+    Raises
+    ------
+    InputError
+        No such file, or one of another kind.
+    """
+    names = [*ROWS, *SENSORS, "sky_seen"]
+    dataset = _read(path, names, ("max_orders",))
+    columns = {name: dataset[name].to_numpy() for name in names}
+    return Transport(**columns, max_orders=int(dataset.attrs["max_orders"]))
+
+
+def write_sunlit(path: str | Path, sunlit: Sunlit) -> None:
+    """Write what sensors see of the sun, whole or not at all."""
+    variables = {
+        name: (dims, getattr(sunlit, name), {"units": "1", "long_name": text})
+        for name, (text, dims) in SUNLIT.items()
+    }
+    _write(path, xr.Dataset(variables))
+
+
+def read_sunlit(path: str | Path) -> Sunlit:
+    """Read what sensors see of the sun as `write_sunlit` writes it."""
+    dataset = _read(path, list(SUNLIT), ())
+    return Sunlit(**{name: dataset[name].to_numpy() for name in SUNLIT})
+
+
+def _write(path: str | Path, dataset: xr.Dataset) -> None:
+    encoding = {name: {"zlib": True, "complevel": 1, "shuffle": True} for name in dataset.data_vars}
+    with atomic(path) as partial:
+        dataset.to_netcdf(partial, engine="netcdf4", encoding=encoding)
+
+
+def _read(path: str | Path, variables: list[str], attributes: tuple[str, ...]) -> xr.Dataset:
+    dataset = read_netcdf(path)
+    missing = [name for name in variables if name not in dataset.variables]
+    missing += [name for name in attributes if name not in dataset.attrs]
+    if missing:
+        raise InputError(
+            path,
+            f"no {', '.join(missing)}",
+            f"a file with {', '.join([*variables, *attributes])}",
+            "Delete it and run again; it may come from another version.",
+        )
+    return dataset
