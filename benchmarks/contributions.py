@@ -17,9 +17,9 @@ import yaml
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
 from dapple.config.settings import Settings, validate
-from dapple.formats import json, meshes, netcdf
+from dapple.formats import json, meshes
 from dapple.light import series, transport, visibility
-from dapple.scene import sensors, traced
+from dapple.scene import scene_optics, sensors, traced
 from dapple.scene.surfaces import Scene
 from dapple.sky.sky_radiance import sky_dataset
 from dapple.sky.sun import Site, broadband
@@ -67,7 +67,7 @@ class Run:
     def __init__(self, folder: Path, step_min: float):
         self.settings: Settings = validate(yaml.safe_load((folder / "config.yaml").read_text()))
         self.registration = json.read(folder / "registration/registration.json")
-        self.optics = netcdf.read_optics(folder / "sky/optics.nc")
+        self.optics = scene_optics.read(folder / "sky/optics.nc")
         table = sensors.read_local(folder / "sky/sensors.csv")
         records = measured.read(Path(self.settings.data_dir) / self.settings.measured.path)
         self.records = records[~records["sensor"].isin(self.registration["fitting_sensors"])]

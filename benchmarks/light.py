@@ -28,7 +28,7 @@ import rays
 from dapple.formats import meshes, netcdf, voxel_grids
 from dapple.light import series, transport, visibility
 from dapple.light.timestep_series import Reference
-from dapple.scene import scene_files, traced
+from dapple.scene import scene_files, scene_optics, traced
 from dapple.scene.surfaces import Scene
 
 KINDS = ("polygons", "voxels_0.2", "voxels_1.0")
@@ -50,7 +50,7 @@ def prepare(folder: Path, kind: str, n_triangles: int, n_sensors: int, n_times: 
         voxel_grids.write(folder / "leaves.nc", scene.voxels)
     meshes.write_ply(folder / "wood.ply", scene.meshes["wood"])
     netcdf.write(folder / "sky.nc", described(crown.sky(n_times)))
-    netcdf.write_optics(folder / "optics.nc", crown.optics())
+    scene_optics.write(folder / "optics.nc", crown.optics())
     np.save(folder / "sensors.npy", crown.sensors(n_sensors))
 
 
@@ -68,7 +68,7 @@ def once(folder: Path, variant: str, tolerance: float) -> dict[str, float]:
     leaves = folder / "leaves.ply"
     leaves = leaves if leaves.exists() else folder / "leaves.nc"
     scene = traced.load(scene_files.read([leaves], folder / "wood.ply")[0], variant)
-    sky, optics = netcdf.read(folder / "sky.nc"), netcdf.read_optics(folder / "optics.nc")
+    sky, optics = netcdf.read(folder / "sky.nc"), scene_optics.read(folder / "optics.nc")
     sensors = np.load(folder / "sensors.npy")
     clock.append(time.perf_counter())
     sunlit = visibility.sunlit(
@@ -129,7 +129,7 @@ def fresh(folder: Path, variant: str, tolerance: float) -> dict[str, float]:
 
 def against_reference(folder: Path, scene: Scene, fast: dict, variant: str, n_compared: int):
     """Time of the per-timestep engine at equal standard error, and how far both agree."""
-    sky, optics = netcdf.read(folder / "sky.nc"), netcdf.read_optics(folder / "optics.nc")
+    sky, optics = netcdf.read(folder / "sky.nc"), scene_optics.read(folder / "optics.nc")
     sensors = pd.DataFrame(np.load(folder / "sensors.npy"), columns=["x_m", "y_m", "z_m"])
     sensors.insert(0, "sensor", [f"1_{k}" for k in range(len(sensors))])
     chosen = np.linspace(0, sky.sizes["time"] - 1, n_compared).astype(int)

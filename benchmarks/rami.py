@@ -19,8 +19,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
 from dapple.formats import rami
 from dapple.frames import direction_from_angles
-from dapple.light import brf, patterns, visibility
-from dapple.scene import traced
+from dapple.light import brf, visibility
+from dapple.scene import patterns, traced
 from dapple.scene.surfaces import Optics, Scene
 
 CELL_M = np.array([[-50.0, -50.0], [50.0, 50.0]])

@@ -12,8 +12,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 import crown
 
 from dapple.frames import direction_from_angles
-from dapple.light import patterns, rays_to_sky, series
-from dapple.scene import traced
+from dapple.light import rays_to_sky, series
+from dapple.scene import patterns, traced
 from dapple.scene.surfaces import Scene
 
 SUN_DIAMETER_DEG = 0.533

@@ -6,7 +6,7 @@ import xarray as xr
 
 from dapple.formats import netcdf
 from dapple.light.timestep_series import Reference
-from dapple.scene import scene_files
+from dapple.scene import scene_files, scene_optics
 from dapple.times import spread
 from dapple.workflow import run
 
@@ -31,7 +31,7 @@ def main(snakemake):
     points = pd.DataFrame({"x_m": east.ravel(), "y_m": north.ravel(), "z_m": level})
     points.insert(0, "sensor", [f"g{k}" for k in range(len(points))])
     at_chosen = sky.isel(time=chosen)
-    optics = netcdf.read_optics(inputs.optics)
+    optics = scene_optics.read(inputs.optics)
     reference = Reference([scene], at_chosen, optics, **params.engine, seed=params.seed)
     series = [reference.at(index, points)["par_umol_m2_s"] for index in range(len(chosen))]
     par = np.stack([one.to_numpy().reshape(east.shape) for one in series])

@@ -2,14 +2,14 @@
 
 from dapple.formats import json, netcdf
 from dapple.light import light_model, series, transport_files
-from dapple.scene import scene_files, sensors, traced
+from dapple.scene import scene_files, scene_optics, sensors, traced
 from dapple.streams import stream_seed
 from dapple.workflow import run
 
 
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
-    sky, optics = netcdf.read(inputs.sky), netcdf.read_optics(inputs.optics)
+    sky, optics = netcdf.read(inputs.sky), scene_optics.read(inputs.optics)
     table = sensors.read_local(inputs.sensors)
     advised = json.read(inputs.model) if inputs.model else {"bands": len(optics)}
     model = light_model.Model(**advised)

@@ -2,7 +2,7 @@
 
 from dapple.formats import netcdf
 from dapple.light.timestep_series import Reference, run_all
-from dapple.scene import scene_files, sensors
+from dapple.scene import scene_files, scene_optics, sensors
 from dapple.workflow import run
 
 
@@ -11,7 +11,7 @@ def main(snakemake):
     reference = Reference(
         scene_files.read(inputs.leaves, inputs.wood, params.ground_z_m),
         netcdf.read(inputs.sky).isel(time=params.times),
-        netcdf.read_optics(inputs.optics),
+        scene_optics.read(inputs.optics),
         **params.engine,
         seed=params.seed,
     )

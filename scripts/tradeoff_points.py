@@ -12,7 +12,7 @@ from dapple.formats.atomic import atomic
 from dapple.light import light_model, series
 from dapple.light.light_model import Cost, Effort, Model, timed
 from dapple.light.timestep_series import Reference
-from dapple.scene import scene_files, sensors, traced
+from dapple.scene import scene_files, scene_optics, sensors, traced
 from dapple.scene.surfaces import Scene
 from dapple.workflow import run
 
@@ -25,7 +25,7 @@ class Grid:
     """The sensors, times and references that all points share."""
 
     def __init__(self, params, inputs):
-        sky, self.optics = netcdf.read(inputs.sky), netcdf.read_optics(inputs.optics)
+        sky, self.optics = netcdf.read(inputs.sky), scene_optics.read(inputs.optics)
         table = sensors.read_local(inputs.sensors)
         lit = np.flatnonzero(series.open_sky_par(sky).to_numpy() > 0)
         self.sky = sky.isel(time=lit[light_model.spread(len(lit), params.times)])

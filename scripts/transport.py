@@ -3,8 +3,7 @@
 from dapple.formats import json
 from dapple.light import series, transport
 from dapple.light import transport_files as files
-from dapple.optics.surfaces import scene_optics
-from dapple.scene import scene_files, sensors, traced
+from dapple.scene import scene_files, scene_optics, sensors, traced
 from dapple.workflow import run
 
 
@@ -24,7 +23,7 @@ def main(snakemake):
         max_orders=advised.get("max_orders", params.max_orders),
         tolerance=series.PATH_SHARE * params.tolerance,
         # Nominal spectra: the run's own may change without tracing again.
-        optics=scene_optics(),
+        optics=scene_optics.from_spectra(),
         sun_kernel_deg=params.sun_kernel_deg,
         aperture_m=params.aperture_m,
         seed=params.seed,

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from dapple import engine
-from dapple.light.patterns import cosine_hemisphere
 from dapple.scene.mitsuba_plugins import register
+from dapple.scene.patterns import cosine_hemisphere
 from dapple.scene.phase import (
     phase_function,
     quantile_argument,

@@ -2,9 +2,10 @@ import numpy as np
 import pytest
 
 from dapple.errors import InputError
-from dapple.optics import surfaces
+from dapple.optics import surface_spectra
 from dapple.optics.bands import band_edges, band_mean, band_width, par_bands, photon_flux
 from dapple.optics.leaf import leaf_spectra
+from dapple.scene import scene_optics
 
 BANDS = par_bands()
 
@@ -69,12 +70,12 @@ def test_a_surface_is_a_number_a_table_or_a_file(tmp_path):
     path = tmp_path / "moss.csv"
     path.write_text("wavelength_nm,front_reflectance,transmittance\n700,0.4,0\n390,0.09,0\n")
     table = {"wavelength_nm": (390.0, 700.0), "reflectance": (0.09, 0.4)}
-    expected = surfaces.reflectance(table, BANDS)
+    expected = surface_spectra.reflectance(table, BANDS)
     assert expected[20] == pytest.approx(0.2)  # 500 nm: 0.09 + 110 × 0.001
-    assert surfaces.reflectance(path, BANDS) == pytest.approx(expected)
+    assert surface_spectra.reflectance(path, BANDS) == pytest.approx(expected)
     with_path = {"wavelength_nm": (400.0, 700.0), "reflectance": (0.9, 0.9), "path": path}
-    assert surfaces.reflectance(with_path, BANDS) == pytest.approx(expected)
-    assert surfaces.reflectance(0.2, BANDS) == pytest.approx(np.full(61, 0.2))
+    assert surface_spectra.reflectance(with_path, BANDS) == pytest.approx(expected)
+    assert surface_spectra.reflectance(0.2, BANDS) == pytest.approx(np.full(61, 0.2))
 
 
 @pytest.mark.parametrize(
@@ -89,19 +90,19 @@ def test_a_surface_is_a_number_a_table_or_a_file(tmp_path):
 )
 def test_an_impossible_surface_is_refused(wavelengths, values, message):
     with pytest.raises(InputError, match=message):
-        surfaces.reflectance({"wavelength_nm": wavelengths, "reflectance": values}, BANDS)
+        surface_spectra.reflectance({"wavelength_nm": wavelengths, "reflectance": values}, BANDS)
 
 
 def test_a_spectrum_file_that_is_missing_or_foreign_is_refused(tmp_path):
     with pytest.raises(InputError, match="no file"):
-        surfaces.read(tmp_path / "none.csv")
+        surface_spectra.read(tmp_path / "none.csv")
     (tmp_path / "foreign.csv").write_text("nm,r\n400,0.1\n")
     with pytest.raises(InputError, match="columns nm, r; expected `wavelength_nm`"):
-        surfaces.read(tmp_path / "foreign.csv")
+        surface_spectra.read(tmp_path / "foreign.csv")
 
 
 def test_the_optics_of_a_scene_have_one_value_per_band_and_kind():
-    optics = surfaces.scene_optics(leaf={"n": 1.8}, bark=0.2)
+    optics = scene_optics.from_spectra(leaf={"n": 1.8}, bark=0.2)
     for name in ("leaf_reflectance", "leaf_transmittance", "ground_reflectance"):
         values = getattr(optics, name)
         assert values.shape == (61,)

@@ -6,7 +6,7 @@ import pytest
 from dapple.errors import InputError
 from dapple.formats import netcdf as files
 from dapple.optics.bands import par_bands
-from dapple.optics.surfaces import scene_optics
+from dapple.scene import scene_optics
 from dapple.sky import sky_radiance, sun
 from dapple.sky.patches import SUBDIVISIONS, patches
 from dapple.sky.spectrum import par_spectrum
@@ -409,10 +409,10 @@ def test_a_sky_comes_back_from_its_file_as_it_went_and_always_with_the_same_byte
 
 
 def test_optics_come_back_from_their_file(tmp_path):
-    optics = scene_optics()
-    files.write_optics(tmp_path / "optics.nc", optics)
-    back = files.read_optics(tmp_path / "optics.nc")
-    for name in (*files.OPTICS_NAMES, "wavelength_nm"):
+    optics = scene_optics.from_spectra()
+    scene_optics.write(tmp_path / "optics.nc", optics)
+    back = scene_optics.read(tmp_path / "optics.nc")
+    for name in (*scene_optics.OPTICS_NAMES, "wavelength_nm"):
         assert (getattr(back, name) == getattr(optics, name)).all()
 
 

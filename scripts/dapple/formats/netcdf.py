@@ -1,4 +1,4 @@
-"""NetCDF of light: the sky, optical properties, and light at sensors."""
+"""NetCDF datasets with units and names on every variable, and times that say their zone."""
 
 from pathlib import Path
 
@@ -8,15 +8,8 @@ import xarray as xr
 
 from dapple.errors import InputError
 from dapple.formats.atomic import atomic
-from dapple.scene.surfaces import Optics
 from dapple.times import utc
 
-OPTICS_NAMES = {
-    "leaf_reflectance": "reflectance of leaves",
-    "leaf_transmittance": "transmittance of leaves",
-    "bark_reflectance": "reflectance of bark",
-    "ground_reflectance": "reflectance of the ground",
-}
 TIME_ENCODING = {"units": "milliseconds since 1970-01-01", "dtype": "int64"}
 
 
@@ -84,19 +77,3 @@ def read(path: str | Path) -> xr.Dataset:
         raise InputError(
             path, f"an unreadable file ({error})", "a NetCDF file", "Delete it and run again."
         ) from error
-
-
-def write_optics(path: str | Path, optics: Optics) -> None:
-    """Write optical properties as NetCDF with the dimension `band`."""
-    variables = {
-        name: ("band", getattr(optics, name), {"units": "1", "long_name": text})
-        for name, text in OPTICS_NAMES.items()
-    }
-    centre = {"units": "nm", "long_name": "centre of the band"}
-    write(path, xr.Dataset(variables, {"wavelength_nm": ("band", optics.wavelength_nm, centre)}))
-
-
-def read_optics(path: str | Path) -> Optics:
-    """Read optical properties as `write_optics` writes them."""
-    dataset = read(path)
-    return Optics(**{name: dataset[name].to_numpy() for name in ("wavelength_nm", *OPTICS_NAMES)})

@@ -9,8 +9,7 @@ from collections.abc import Callable, Iterator
 import drjit as dr
 import numpy as np
 
-from dapple.light import patterns
-from dapple.scene import traced
+from dapple.scene import patterns, traced
 from dapple.scene.surfaces import Scene
 from dapple.scene.traced import TracedScene
 from dapple.sky.patches import Patches, patches

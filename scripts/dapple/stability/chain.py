@@ -21,8 +21,7 @@ from dapple.formats.meshes import Mesh
 from dapple.formats.shots import Shots
 from dapple.light import light_model, series, transport, visibility
 from dapple.light.series import Light
-from dapple.optics.surfaces import scene_optics
-from dapple.scene import traced
+from dapple.scene import scene_optics, traced
 from dapple.stability import world
 from dapple.stability.reconstructions import METHODS, Structure
 from dapple.stability.stressors import STAGES, UNDISTURBED, Conditions, key
@@ -70,7 +69,7 @@ class Chain:
 
     def __init__(self, setup: Setup, seed: int):
         self.setup, self.seed = setup, seed
-        self.optics = scene_optics()
+        self.optics = scene_optics.from_spectra()
         self._spent = 0.0
         self._made: dict[str, tuple[tuple, Any, float]] = {}
         self._given: dict[tuple[str, tuple], tuple[Any, float]] = {}

@@ -15,7 +15,7 @@ from dapple import engine
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
 from dapple.frames import direction_from_angles
-from dapple.light import patterns
+from dapple.scene import patterns
 from dapple.scene.mitsuba_plugins import register
 from dapple.scene.mitsuba_scene import RenderScene, _looking, _mesh, _sky
 from dapple.streams import stream_seed

@@ -1,4 +1,4 @@
-"""Reflectance of bark and meadow, and all optical properties of a scene together."""
+"""Reflectance of bark and ground: one value, a table, or a file."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -7,8 +7,7 @@ import numpy as np
 import pandas as pd
 
 from dapple.errors import InputError
-from dapple.optics.bands import band_mean, par_bands
-from dapple.scene.surfaces import Optics
+from dapple.optics.bands import band_mean
 
 # Assumed, not measured: between measured branches of birch and larch (0.07 to 0.18, spectral
 # database of LESS, Qi et al. 2019) and the bark colour of the published apple tree (red 0.37,
@@ -120,38 +119,3 @@ def _table(source: Mapping[str, Sequence[float] | str], where: str) -> pd.Series
             "Give one reflectance per wavelength.",
         )
     return pd.Series(values, index=wavelengths, dtype=float).sort_index()
-
-
-def scene_optics(
-    *,
-    leaf: Mapping[str, float | str] | None = None,
-    bark: Spectrum = BARK,
-    ground: Spectrum = MEADOW,
-    wavelength_nm: np.ndarray | None = None,
-) -> Optics:
-    """Optical properties of leaves, bark and ground in every band.
-
-    Parameters
-    ----------
-    leaf : mapping or None
-        Keyword arguments of `dapple.optics.leaf.leaf_spectra`; None: its defaults.
-    bark, ground : float, mapping or path
-        See `reflectance`.
-    wavelength_nm : (b,) float or None
-        Band centres [nm]; None: 400 to 700 nm in steps of 5 nm.
-
-    Returns
-    -------
-    Optics
-    """
-    from dapple.optics.leaf import leaf_spectra
-
-    wavelength = par_bands() if wavelength_nm is None else np.asarray(wavelength_nm, float)
-    leaf_reflectance, leaf_transmittance = leaf_spectra(wavelength, **(leaf or {}))
-    return Optics(
-        wavelength_nm=wavelength,
-        leaf_reflectance=leaf_reflectance,
-        leaf_transmittance=leaf_transmittance,
-        bark_reflectance=reflectance(bark, wavelength, where="bark reflectance"),
-        ground_reflectance=reflectance(ground, wavelength, where="ground reflectance"),
-    )
