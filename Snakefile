@@ -5,33 +5,37 @@ from snakemake.utils import min_version
 min_version("9.0")
 
 
-configfile: "config/config.yaml"
+configfile: f"{workflow.current_basedir}/config/config.yaml"
 
 
 include: "rules/common.smk"
+include: "rules/targets.smk"
 include: "rules/scan.smk"
 include: "rules/cloud.smk"
 include: "rules/structure.smk"
+include: "rules/registration.smk"
 include: "rules/sky.smk"
 include: "rules/light.smk"
 include: "rules/advice.smk"
 include: "rules/statistics.smk"
+include: "rules/verdict.smk"
 include: "rules/figures.smk"
-include: "rules/survey_common.smk"
-include: "rules/survey.smk"
+include: "rules/survey/common.smk"
+include: "rules/survey/scans.smk"
+include: "rules/survey/shadowing.smk"
+include: "rules/survey/plan.smk"
+include: "rules/chlorophyll/common.smk"
+include: "rules/chlorophyll/plots.smk"
+include: "rules/chlorophyll/crowns.smk"
+include: "rules/chlorophyll/images.smk"
+include: "rules/chlorophyll/retrieval.smk"
+include: "rules/stability/common.smk"
+include: "rules/stability/runs.smk"
+include: "rules/stability/map.smk"
+include: "rules/stability/records.smk"
 
 
 rule all:
     default_target: True
     input:
         targets(),
-
-
-include: "rules/chlorophyll_common.smk"
-include: "rules/plots.smk"
-include: "rules/crowns.smk"
-include: "rules/images.smk"
-include: "rules/retrieval.smk"
-include: "rules/stability_common.smk"
-include: "rules/stability.smk"
-include: "rules/verdict.smk"

@@ -46,7 +46,7 @@ if settings.source != "wood":
             correction=None,
             seed=stream("polygons"),
         message:
-            "{settings.experiment}: polygons from {wildcards.size} m voxels"
+            said("polygons from {wildcards.size} m voxels")
         script:
             "../scripts/polygons.py"
 
@@ -77,7 +77,7 @@ if LIT:
             source=settings.source,
             seed=stream("advice"),
         message:
-            "{settings.experiment}: what each refinement of the light changes and costs"
+            said("what each refinement of the light changes and costs")
         script:
             "../scripts/advice.py"
 
@@ -101,7 +101,7 @@ if LIT:
         resources:
             mem_mb=500,
         message:
-            "{settings.experiment}: picture of the advice"
+            said("picture of the advice")
         script:
             "../scripts/advice_figure.py"
 
@@ -128,7 +128,7 @@ if LIT:
             timestep=REFERENCE,
             seed=stream("tradeoff"),
         message:
-            "{settings.experiment}: error and cost of a grid of settings"
+            said("error and cost of a grid of settings")
         script:
             "../scripts/tradeoff_points.py"
 
@@ -155,7 +155,7 @@ if LIT:
         params:
             experiment=settings.experiment,
         message:
-            "{settings.experiment}: accuracy against speed"
+            said("accuracy against speed")
         script:
             "../scripts/tradeoff_chart.py"
 
@@ -165,4 +165,4 @@ if LIT:
             results("tradeoff/chart.png"),
             results("tradeoff/chart.html"),
         message:
-            "{settings.experiment}: tradeoff/"
+            said("tradeoff/")

@@ -29,7 +29,7 @@ rule clean:
         pdal=settings.tools.pdal,
         cloudcompare=settings.tools.cloudcompare,
     message:
-        "{settings.experiment}: noise filter, outliers by {params.outlier_backend}"
+        said("noise filter, outliers by {params.outlier_backend}")
     script:
         "../scripts/clean.py"
 
@@ -54,6 +54,6 @@ rule classify:
         **dict(settings.classify),
         seed=stream("classify"),
     message:
-        "{settings.experiment}: leaf or wood by {params.method}"
+        said("leaf or wood by {params.method}")
     script:
         "../scripts/classify.py"

@@ -1,20 +1,23 @@
 """
-Configuration, names of files, and what every rule shares. No rules here.
+Configuration, names of files, and what rules of several stages share. No rules here.
 
 Needs   config/config.yaml, merged with the file given as --configfile
-Makes   results/{experiment}/config.yaml     the merged configuration of this run
+Makes   nothing
 """
 
 import sys
 from pathlib import Path
 
-sys.path.append(str(Path(workflow.basedir) / "scripts"))
+# Where dapple itself lies: results go to the working directory, which may be elsewhere.
+HOME = Path(str(workflow.current_basedir)).parent
+SCRIPTS = HOME / "scripts"
+sys.path.append(str(SCRIPTS))
 
-from dapple import workflow as dapple_workflow
 from dapple.config.settings import validate
 from dapple.errors import InputError
 from dapple.times import label, time_range
 from dapple.streams import stream_seed
+from dapple.workflow import code_of, short
 
 try:
     settings = validate(config, " + ".join(str(file) for file in workflow.configfiles))
@@ -73,9 +76,19 @@ def benchmarks(name):
     return results(f"benchmarks/{name}.tsv")
 
 
+def said(text):
+    """What a rule says when it runs; in a workflow of several, the experiment tells them apart."""
+    return f"{settings.experiment}: {text}"
+
+
 def code(script):
     """The modules that a script is made of: an edit reruns the rule."""
-    return dapple_workflow.code_of(Path(workflow.basedir) / "scripts" / f"{script}.py")
+    return [local(path) for path in code_of(SCRIPTS / f"{script}.py")]
+
+
+def beside_code(path):
+    """A file that comes with the modules of dapple."""
+    return local(short(SCRIPTS / "dapple" / path))
 
 
 def data(path):
@@ -86,7 +99,7 @@ def data(path):
             f"dapple: {file}: found no such file; expected the data that `{settings.experiment}` "
             "reads. Set data_dir in the configuration to the folder that has it."
         )
-    return str(file)
+    return local(str(file))
 
 
 def optics():
@@ -136,6 +149,18 @@ def wood_mesh(wildcards):
     return results(f"structure/{meshed}/wood.ply")
 
 
+def clumping_correction(wildcards):
+    """Parameters of the voxels' correction, with the finer size that it looks into, or None."""
+    if not settings.corrections.clumping:
+        return None
+    ratio = float(wildcards.size) / (finest := min(settings.voxels.sizes_m))
+    is_multiple = ratio > 1.5 and abs(ratio - round(ratio)) < 1e-6
+    return {
+        "finer_m": finest if is_multiple else None,
+        "fill_range_m": settings.corrections.fill_range_m,
+    }
+
+
 def sized(section):
     """Geometries of all sizes that a section asks for, with sensors and light, by name of input."""
     polygons = section.polygon_sizes_m if settings.source != "wood" else ()
@@ -157,72 +182,3 @@ def sized(section):
         "sky": results("sky/sky.nc"),
         "optics": results("sky/optics.nc"),
     }
-
-
-SURVEY_FILES = (
-    "shadowing.csv",
-    "regression.csv",
-    "profile.csv",
-    "plan.png",
-)
-
-
-CHLOROPHYLL_FILES = (
-    "chlorophyll/accuracy.csv",
-    "chlorophyll/speed.csv",
-    "chlorophyll/map.tif",
-    *(
-        f"chlorophyll/{plot}_{figure}.png"
-        for plot in settings.chlorophyll.plots
-        for figure in ("map", "field", "simulated", "spectra", "losses")
-    ),
-)
-STABILITY_FILES = (
-    "stability/points.csv",
-    "stability/thresholds.csv",
-    "stability/published.csv",
-    "stability/map.png",
-    "stability/curves.png",
-    "stability/verdict.csv",
-)
-
-
-def clumping_correction(wildcards):
-    """Parameters of the voxels' correction, with the finer size that it looks into, or None."""
-    if not settings.corrections.clumping:
-        return None
-    ratio = float(wildcards.size) / (finest := min(settings.voxels.sizes_m))
-    is_multiple = ratio > 1.5 and abs(ratio - round(ratio)) < 1e-6
-    return {
-        "finer_m": finest if is_multiple else None,
-        "fill_range_m": settings.corrections.fill_range_m,
-    }
-
-
-def targets():
-    """What a plain run makes."""
-    if settings.chlorophyll.enabled:
-        return [results("config.yaml"), *map(results, CHLOROPHYLL_FILES)]
-    if settings.stability.enabled:
-        return [results("config.yaml"), *map(results, STABILITY_FILES)]
-    if settings.survey.enabled:
-        return [results("config.yaml"), *(results(f"survey/{f}") for f in SURVEY_FILES)]
-    wanted = ["config.yaml", "classes/scores.json"]
-    wanted += [f"structure/{name}/summary.json" for name in settings.reconstructions]
-    wanted += [f"structure/{name}/voxels.vox" for name in VOXELS]
-    if "polygons" in settings.reconstructions and settings.source != "wood":
-        wanted += ["structure/polygons/distance.json"]
-    if LIT:
-        wanted += [f"light/{name}.nc" for name in LIT]
-        wanted += ["figures/tree.png", "figures/ground_map.png", "figures/series.png"]
-    if CHECKED:
-        wanted += ["statistics/agreement.csv"]
-    if COMPARED:
-        wanted += ["statistics/overall.csv", "statistics/per_sensor.csv"]
-        wanted += [
-            "statistics/mixed_model.csv",
-            "figures/boxplot.png",
-            "figures/scatter.png",
-        ]
-    wanted += ["verdict.json"]
-    return [results(path) for path in [*wanted, "runtime.csv", "report.html"]]

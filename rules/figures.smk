@@ -33,7 +33,7 @@ rule tree_figure:
     resources:
         mem_mb=2000,
     message:
-        "{settings.experiment}: picture of the tree"
+        said("picture of the tree")
     script:
         "../scripts/tree_figure.py"
 
@@ -63,7 +63,7 @@ rule series_figure:
         reconstructions=LIT,
         timezone=settings.site.timezone,
     message:
-        "{settings.experiment}: PAR through the day"
+        said("PAR through the day")
     script:
         "../scripts/series_figure.py"
 
@@ -95,7 +95,7 @@ rule comparison_figures:
     resources:
         mem_mb=1000,
     message:
-        "{settings.experiment}: correlation by reconstruction"
+        said("correlation by reconstruction")
     script:
         "../scripts/comparison_figures.py"
 
@@ -121,7 +121,7 @@ rule ground_map_figure:
     resources:
         mem_mb=1000,
     message:
-        "{settings.experiment}: PAR on the ground"
+        said("PAR on the ground")
     script:
         "../scripts/ground_map_figure.py"
 
@@ -144,6 +144,6 @@ rule page:
     params:
         experiment=settings.experiment,
     message:
-        "{settings.experiment}: report.html"
+        said("report.html")
     script:
         "../scripts/page.py"

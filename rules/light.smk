@@ -3,47 +3,12 @@ Light: what arrives at the sensors.
 
 Needs   structure/{reconstruction}/, sky/sky.nc, sky/optics.nc, sky/sensors.csv; light/model.json where
         light.model is advised
-Makes   registration/registration.json                  origin of the tree's frame, clock offset
-        light/transport/{reconstruction}_{placement}.nc counted paths: any sky, spectrum and time
+Makes   light/transport/{reconstruction}_{placement}.nc counted paths: any sky, spectrum and time
         light/{reconstruction}.nc                       the series of all times
         light/timesteps/{reconstruction}/{time}.nc      the independent check, one cached file a timestep
         light/reference/{reconstruction}.nc             its series
         light/ground_map.nc                             light on the ground at a few times
 """
-
-
-rule registration:
-    input:
-        leaves=leaf_meshes("polygons") if settings.registration.fit else [],
-        wood=results("structure/polygons/wood.ply") if settings.registration.fit else [],
-        sensors=data(settings.sensors.path) if settings.registration.fit else [],
-        measured=data(settings.measured.path) if settings.registration.fit else [],
-        radiation=(
-            data(settings.radiation.path)
-            if settings.registration.fit and settings.radiation.kind == "table"
-            else []
-        ),
-        code=code("registration"),
-    output:
-        registration=results("registration/registration.json"),
-    log:
-        logs("registration"),
-    benchmark:
-        benchmarks("registration")
-    conda:
-        "../envs/dapple.yaml"
-    threads: 2
-    resources:
-        mem_mb=4000,
-    params:
-        **dict(settings.registration),
-        **(SKY if settings.registration.fit else {}),
-        variant=f"{VARIANT}_rgb",
-        seed=stream("registration"),
-    message:
-        "{settings.experiment}: origin of the tree's frame and offset of the clock"
-    script:
-        "../scripts/registration.py"
 
 
 rule timesteps:
@@ -79,7 +44,7 @@ rule timesteps:
         n_times=len(REFERENCE_TIMES),
         seed=stream("timesteps"),
     message:
-        "{settings.experiment}: Mitsuba, {wildcards.reconstruction}, {params.n_times} times"
+        said("Mitsuba, {wildcards.reconstruction}, {params.n_times} times")
     script:
         "../scripts/timesteps.py"
 
@@ -108,7 +73,7 @@ rule reference:
     resources:
         mem_mb=1000,
     message:
-        "{settings.experiment}: series of the timesteps, {wildcards.reconstruction}"
+        said("series of the timesteps, {wildcards.reconstruction}")
     script:
         "../scripts/reference.py"
 
@@ -140,7 +105,7 @@ if settings.light.engine == "transport":
             variant=f"{VARIANT}_mono",
             seed=lambda wildcards: stream("transport", wildcards.placement),
         message:
-            "{settings.experiment}: trace paths, {wildcards.reconstruction} {wildcards.placement}"
+            said("trace paths, {wildcards.reconstruction} {wildcards.placement}")
         script:
             "../scripts/transport.py"
 
@@ -176,7 +141,7 @@ if settings.light.engine == "transport":
             variant=f"{VARIANT}_mono",
             seed=stream("light"),
         message:
-            "{settings.experiment}: light series, {wildcards.reconstruction}, {params.n_times} times"
+            said("light series, {wildcards.reconstruction}, {params.n_times} times")
         script:
             "../scripts/light.py"
 
@@ -207,6 +172,6 @@ rule ground_map:
         ground_z_m=settings.ground_z_m,
         seed=stream("ground_map"),
     message:
-        "{settings.experiment}: light on the ground around the tree"
+        said("light on the ground around the tree")
     script:
         "../scripts/ground_map.py"

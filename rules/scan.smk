@@ -27,7 +27,7 @@ rule configuration:
     params:
         settings=settings.model_dump(mode="json"),
     message:
-        "{settings.experiment}: the merged configuration"
+        said("the merged configuration")
     script:
         "../scripts/configuration.py"
 
@@ -54,7 +54,7 @@ if settings.source == "virtual":
             **dict(settings.plant),
             seed=stream("plant"),
         message:
-            "{settings.experiment}: grow a virtual apple tree"
+            said("grow a virtual apple tree")
         script:
             "../scripts/plant.py"
 
@@ -77,7 +77,7 @@ if settings.source == "wood":
         resources:
             mem_mb=500,
         message:
-            "{settings.experiment}: wood polygons of {input.obj}"
+            said("wood polygons of {input.obj}")
         script:
             "../scripts/real_wood.py"
 
@@ -100,7 +100,7 @@ if settings.source == "wood":
             **settings.leaves.model_dump(exclude={"placements"}),
             seed=lambda wildcards: stream("virtual_leaves", wildcards.placement),
         message:
-            "{settings.experiment}: leaves along the real wood, placement {wildcards.placement}"
+            said("leaves along the real wood, placement {wildcards.placement}")
         script:
             "../scripts/virtual_leaves.py"
 
@@ -121,7 +121,7 @@ if settings.source == "wood":
         resources:
             mem_mb=1000,
         message:
-            "{settings.experiment}: areas of the real wood and its virtual leaves"
+            said("areas of the real wood and its virtual leaves")
         script:
             "../scripts/virtual_leaves_summary.py"
 
@@ -160,7 +160,7 @@ if settings.source == "cloud":
                 else []
             ),
         message:
-            "{settings.experiment}: read {input.cloud}"
+            said("read {input.cloud}")
         script:
             "../scripts/ingest.py"
 
@@ -189,6 +189,6 @@ else:
             seed=stream("scan"),
             ground_z_m=settings.ground_z_m,
         message:
-            "{settings.experiment}: scan the tree from {params.positions} positions"
+            said("scan the tree from {params.positions} positions")
         script:
             "../scripts/scan.py"

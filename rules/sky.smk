@@ -31,7 +31,7 @@ rule sky:
         time=dict(settings.time),
         n_times=len(TIMES),
     message:
-        "{settings.experiment}: sun and sky at {params.n_times} times"
+        said("sun and sky at {params.n_times} times")
     script:
         "../scripts/sky.py"
 
@@ -58,7 +58,7 @@ rule optics:
     params:
         **OPTICS,
     message:
-        "{settings.experiment}: spectra of leaf, bark and ground"
+        said("spectra of leaf, bark and ground")
     script:
         "../scripts/optics.py"
 
@@ -85,6 +85,6 @@ rule sensors:
         **settings.sensors.model_dump(exclude={"path"}),
         ground_z_m=settings.ground_z_m,
     message:
-        "{settings.experiment}: sensors in the local frame"
+        said("sensors in the local frame")
     script:
         "../scripts/sensors.py"

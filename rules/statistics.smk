@@ -37,7 +37,7 @@ rule records:
         reconstructions=COMPARED,
         seed=stream("records"),
     message:
-        "{settings.experiment}: measured beside simulated light"
+        said("measured beside simulated light")
     script:
         "../scripts/records.py"
 
@@ -67,7 +67,7 @@ rule statistics:
         **dict(settings.statistics),
         seed=stream("statistics"),
     message:
-        "{settings.experiment}: correlation, error, bias"
+        said("correlation, error, bias")
     script:
         "../scripts/statistics.py"
 
@@ -92,7 +92,7 @@ rule agreement:
     params:
         reconstructions=CHECKED,
     message:
-        "{settings.experiment}: transport engine against the per-timestep engine"
+        said("transport engine against the per-timestep engine")
     script:
         "../scripts/agreement.py"
 
@@ -117,9 +117,8 @@ rule runtime:
     resources:
         mem_mb=500,
     params:
-        benchmarks=results("benchmarks"),
         reconstructions=settings.reconstructions,
     message:
-        "{settings.experiment}: time and memory of every step"
+        said("time and memory of every step")
     script:
         "../scripts/runtime.py"

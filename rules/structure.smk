@@ -46,7 +46,7 @@ if settings.source != "wood":
             ),
             seed=stream("polygons"),
         message:
-            "{settings.experiment}: polygons from {params.voxel_size_m} m voxels"
+            said("polygons from {params.voxel_size_m} m voxels")
         script:
             "../scripts/polygons.py"
 
@@ -72,7 +72,7 @@ if settings.source != "wood":
             max_points=settings.clean.distance_points,
             seed=stream("cloud_to_mesh"),
         message:
-            "{settings.experiment}: distance of the cleaned points from the polygons"
+            said("distance of the cleaned points from the polygons")
         script:
             "../scripts/cloud_to_mesh.py"
 
@@ -97,7 +97,7 @@ rule export_obj:
     resources:
         mem_mb=1000,
     message:
-        "{settings.experiment}: {wildcards.meshed} in the axes of {wildcards.axes}"
+        said("{wildcards.meshed} in the axes of {wildcards.axes}")
     script:
         "../scripts/export_obj.py"
 
@@ -124,7 +124,7 @@ rule voxels:
         correction=clumping_correction,
         majority_voxel_m=settings.classify.majority_voxel_m,
     message:
-        "{settings.experiment}: plant area density in {wildcards.size} m voxels"
+        said("plant area density in {wildcards.size} m voxels")
     script:
         "../scripts/voxels.py"
 
@@ -142,7 +142,7 @@ rule export:
             axes=["less", "dart"],
         ),
     message:
-        "{settings.experiment}: OBJ for LESS and DART"
+        said("OBJ for LESS and DART")
 
 
 rule voxels_summary:
@@ -167,6 +167,6 @@ rule voxels_summary:
     resources:
         mem_mb=1000,
     message:
-        "{settings.experiment}: areas in {wildcards.size} m voxels"
+        said("areas in {wildcards.size} m voxels")
     script:
         "../scripts/voxels_summary.py"

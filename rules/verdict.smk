@@ -4,7 +4,6 @@ Verdict: how far a run can be trusted, from what it leaves behind alone.
 Needs   classes/cloud.laz; scan/shots.parquet, structure/, light/, sky/ and statistics/records.csv as far
         as the run makes them
 Makes   verdict.json      green, amber or red for every reconstruction, with reasons and remedies
-        stability/verdict_model.json, verdict.csv   fitted to stress runs; detection and false alarms
 """
 
 JUDGED = [name for name in settings.reconstructions if name != "truth"]
@@ -33,7 +32,7 @@ rule verdict:
         sky=results("sky/sky.nc") if LIT else [],
         sensors=results("sky/sensors.csv") if LIT else [],
         records=results("statistics/records.csv") if COMPARED else [],
-        model="scripts/dapple/verdict/verdict_model.json",
+        model=beside_code("verdict/verdict_model.json"),
         code=code("verdict"),
     output:
         verdict=results("verdict.json"),
@@ -57,28 +56,6 @@ rule verdict:
         aperture_m=settings.light.aperture_m,
         seed=stream("verdict"),
     message:
-        "{settings.experiment}: how far the run can be trusted"
+        said("how far the run can be trusted")
     script:
         "../scripts/verdict.py"
-
-
-rule stability_verdict:
-    input:
-        points=results("stability/points.csv"),
-        code=code("stability_verdict"),
-    output:
-        model=results("stability/verdict_model.json"),
-        rates=results("stability/verdict.csv"),
-    log:
-        logs("stability_verdict"),
-    benchmark:
-        benchmarks("stability_verdict")
-    conda:
-        "../envs/dapple.yaml"
-    threads: 1
-    resources:
-        mem_mb=500,
-    message:
-        "{settings.experiment}: which signals go with failures"
-    script:
-        "../scripts/stability_verdict.py"

@@ -8,7 +8,7 @@ from dapple.workflow import run
 
 
 def main(snakemake):
-    folder = Path(snakemake.params.benchmarks)
+    folder = Path(snakemake.output.runtime).parent / "benchmarks"
     table = runtime.collect(sorted(folder.rglob("*.tsv")), folder, snakemake.params.reconstructions)
     with atomic(snakemake.output.runtime) as partial:
         table.to_csv(partial, index=False, float_format="%.2f")

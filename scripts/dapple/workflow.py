@@ -27,11 +27,14 @@ def code_of(script: Path) -> tuple[str, ...]:
                 found.add(module)
                 waiting.append(module)
     r_code = {beside for module in found for beside in module.parent.glob(f"{module.stem}*.R")}
-    return tuple(sorted(_short(path) for path in found | r_code))
+    return tuple(sorted(short(path) for path in found | r_code))
 
 
-def _short(path: Path) -> str:
-    """Relative where it can be: a folder that moves is not taken for other code."""
+def short(path: Path) -> str:
+    """A path, relative to the working directory where it lies in it.
+
+    A folder that moves is then not taken for other code.
+    """
     here = Path.cwd()
     return str(path.relative_to(here) if path.is_relative_to(here) else path)
 

@@ -97,6 +97,7 @@ def test_an_unknown_key_is_told_before_a_wrong_value():
             "less than or equal to 2",
         ),
         ({"site": {"latitude_deg": 100}}, "`site.latitude_deg: 100`", "less than or equal to 90"),
+        ({"study": "lidar"}, "`study: 'lidar'`", "'light', 'survey', 'chlorophyll' or 'stability'"),
         ({"seed": -1}, "`seed: -1`", "greater than or equal to 0"),
         ({"registration": {"fit_share": 1.2}}, "`registration.fit_share: 1.2`", "less than"),
         ({"light": {"variant": "gpu"}}, "`light.variant: 'gpu'`", "'llvm' or 'cuda'"),

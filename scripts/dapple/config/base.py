@@ -26,7 +26,7 @@ ZANDE = "Van der Zande et al. 2008"
 LMS = "after the SICK LMS200"
 
 
-def parameter(default: Any, text: str, source: str = "") -> Any:
+def key(default: Any, text: str, source: str = "") -> Any:
     """A key: default, what it means, and where its value comes from."""
     return Field(
         default, description=text, json_schema_extra={"source": source} if source else None

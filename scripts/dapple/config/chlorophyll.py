@@ -6,8 +6,7 @@ from typing import Annotated, Literal
 
 from annotated_types import Ge, Gt, Le, Lt
 
-from dapple.config.base import Count, NotNegative, Positive, Section, Share
-from dapple.config.base import parameter as _
+from dapple.config.base import Count, NotNegative, Positive, Section, Share, key
 
 ZHAO = "Zhao et al. 2025"
 ZHANG = "Zhang et al. 2016"
@@ -18,222 +17,228 @@ GridRange = tuple[NotNegative, NotNegative, Count]
 class Plot(Section):
     """A plot: its virtual trees and the flight over it, or files of a real one."""
 
-    lidar: str = _("", "LAZ of a real plot, relative to data_dir; empty: the virtual plot")
-    images: str = _("", "GeoTIFF of five bands of a real plot, relative to data_dir")
-    crowns: str = _("", "GeoJSON of crowns with `lcc_ug_cm2`, relative to data_dir")
-    size_m: tuple[Positive, Positive] = _((50.0, 50.0), "edges east and north", ZHAO)
-    cover: Annotated[float, Gt(0), Le(0.95)] = _(0.62, "canopy cover", ZHAO)
-    species: Literal["larch", "spruce"] = _("larch", "of the virtual trees")
-    height_m: Annotated[float, Ge(3)] = _(15.0, "mean height of the trees")
-    height_sd_m: NotNegative = _(1.5, "standard deviation of heights, cut off at twice that")
-    crown_radius_m: Positive = _(2.5, "mean radius of crowns: the circle as large as their outline")
-    crown_radius_sd_m: NotNegative = _(0.35, "standard deviation, cut off at twice that")
-    crown_base_share: Annotated[float, Gt(0), Lt(0.9)] = _(0.3, "height of the crown's base")
-    dbh_m: Positive = _(0.2, "stem diameter at 1.3 m")
-    crown_leaf_area_index: Positive = _(3.0, "leaf area over the area of the crown's outline")
-    sun_zenith_deg: Annotated[float, Ge(0), Le(80)] = _(58.0, "of the images", ZHAO)
-    sun_azimuth_deg: Annotated[float, Ge(0), Le(360)] = _(266.32, "of the images", ZHAO)
-    diffuse_share: tuple[Share, Share, Share, Share, Share] = _(
+    lidar: str = key("", "LAZ of a real plot, relative to data_dir; empty: the virtual plot")
+    images: str = key("", "GeoTIFF of five bands of a real plot, relative to data_dir")
+    crowns: str = key("", "GeoJSON of crowns with `lcc_ug_cm2`, relative to data_dir")
+    size_m: tuple[Positive, Positive] = key((50.0, 50.0), "edges east and north", ZHAO)
+    cover: Annotated[float, Gt(0), Le(0.95)] = key(0.62, "canopy cover", ZHAO)
+    species: Literal["larch", "spruce"] = key("larch", "of the virtual trees")
+    height_m: Annotated[float, Ge(3)] = key(15.0, "mean height of the trees")
+    height_sd_m: NotNegative = key(1.5, "standard deviation of heights, cut off at twice that")
+    crown_radius_m: Positive = key(
+        2.5, "mean radius of crowns: the circle as large as their outline"
+    )
+    crown_radius_sd_m: NotNegative = key(0.35, "standard deviation, cut off at twice that")
+    crown_base_share: Annotated[float, Gt(0), Lt(0.9)] = key(0.3, "height of the crown's base")
+    dbh_m: Positive = key(0.2, "stem diameter at 1.3 m")
+    crown_leaf_area_index: Positive = key(3.0, "leaf area over the area of the crown's outline")
+    sun_zenith_deg: Annotated[float, Ge(0), Le(80)] = key(58.0, "of the images", ZHAO)
+    sun_azimuth_deg: Annotated[float, Ge(0), Le(360)] = key(266.32, "of the images", ZHAO)
+    diffuse_share: tuple[Share, Share, Share, Share, Share] = key(
         (0.32, 0.19, 0.14, 0.11, 0.09),
         "of the light on level ground, from the sky, in the five bands",
         "SPECTRL2 (Bird and Riordan 1986), aerosol optical depth 0.1 at 500 nm",
     )
-    pixel_m: Positive = _(0.04, "of the images", ZHAO)
-    shoot_recollision: Annotated[float, Ge(0), Lt(1)] = _(
+    pixel_m: Positive = key(0.04, "of the images", ZHAO)
+    shoot_recollision: Annotated[float, Ge(0), Lt(1)] = key(
         0.0,
         "chance that light scattered by a needle meets its own shoot; rays in the virtual shoots",
         "Smolander and Stenberg 2003: 0.47 in Scots pine",
     )
-    field_trees: Count = _(28, "trees with measured chlorophyll", ZHAO)
+    field_trees: Count = key(28, "trees with measured chlorophyll", ZHAO)
 
 
 class World(Section):
     """What the virtual plots share: chlorophyll, needles, terrain, LiDAR, camera."""
 
-    crs: str = _("EPSG:25832", "coordinate system of the plots: projected, in metres")
-    origin_m: tuple[float, float, float] = _(
+    crs: str = key("EPSG:25832", "coordinate system of the plots: projected, in metres")
+    origin_m: tuple[float, float, float] = key(
         (612_000.0, 5_324_000.0, 640.0), "south-west corner of the plots"
     )
-    grown_trees: Count = _(5, "different trees; all others are turned and scaled copies")
-    core_share: Annotated[float, Gt(0), Le(1)] = _(
+    grown_trees: Count = key(5, "different trees; all others are turned and scaled copies")
+    core_share: Annotated[float, Gt(0), Le(1)] = key(
         0.7, "least distance of two stems over the sum of both crown radii"
     )
-    lcc_mean_ug_cm2: Positive = _(39.9, "mean leaf chlorophyll of the trees", ZHAO)
-    lcc_sd_ug_cm2: Positive = _(10.8, "standard deviation between trees", ZHAO)
-    lcc_range_ug_cm2: tuple[Positive, Positive] = _((10.0, 70.0), "no tree lies outside", ZHAO)
-    lowest_to_highest_lcc: Annotated[float, Gt(0.3), Lt(3)] = _(
+    lcc_mean_ug_cm2: Positive = key(39.9, "mean leaf chlorophyll of the trees", ZHAO)
+    lcc_sd_ug_cm2: Positive = key(10.8, "standard deviation between trees", ZHAO)
+    lcc_range_ug_cm2: tuple[Positive, Positive] = key((10.0, 70.0), "no tree lies outside", ZHAO)
+    lowest_to_highest_lcc: Annotated[float, Gt(0.3), Lt(3)] = key(
         1.0, "chlorophyll of the lowest needles over the highest; a tree's value is their mean"
     )
-    lcc_layers: Annotated[int, Ge(1), Le(20)] = _(5, "steps in which it changes with height")
-    needle_structure: tuple[Positive, NotNegative] = _(
+    lcc_layers: Annotated[int, Ge(1), Le(20)] = key(5, "steps in which it changes with height")
+    needle_structure: tuple[Positive, NotNegative] = key(
         (1.6, 0.1), "PROSPECT's N, mean and standard deviation between trees"
     )
-    dry_matter_g_cm2: tuple[Positive, NotNegative] = _(
+    dry_matter_g_cm2: tuple[Positive, NotNegative] = key(
         (0.012, 0.002), "mean and standard deviation between trees"
     )
-    brown: tuple[NotNegative, NotNegative] = _(
+    brown: tuple[NotNegative, NotNegative] = key(
         (0.05, 0.03), "brown pigments, mean and standard deviation between trees"
     )
-    water_cm: NotNegative = _(0.015, "equivalent water thickness", ZHAO)
-    shoot_length_m: Positive = _(0.16, "strips of needles that make up a shoot")
-    strip_width_m: Positive = _(0.02, "of these strips")
-    strips_per_shoot: Annotated[int, Ge(1), Le(20)] = _(4, "strips around the axis of a shoot")
-    slope: Annotated[float, Ge(0), Le(1)] = _(0.04, "of the mean ground, rise per metre")
-    wave_height_m: NotNegative = _(1.5, "greatest height of the ground's waves")
-    wave_length_m: Positive = _(30.0, "longest of these waves; the shortest is half as long")
-    terrain_step_m: Positive = _(0.25, "edge of the ground's triangles and of its colours")
-    soil_brightness: Share = _(0.55, "of the dry and the wet soil of prosail")
-    soil_moisture: Share = _(0.4, "mean over the ground")
-    litter_share: Share = _(0.4, "of the ground, under litter of needles; mean")
-    ground_variation: Share = _(0.2, "standard deviation of soil_moisture and litter_share")
-    lidar_height_m: Annotated[float, Ge(10)] = _(50.0, "of the UAV above the mean ground", ZHAO)
-    lidar_pulses_per_m2: Positive = _(950.0, "about 2000 points per m² with several returns", ZHAO)
-    lidar_line_spacing_m: Positive = _(17.5, "between parallel flight lines")
-    lidar_half_swath_deg: Annotated[float, Gt(0), Le(60)] = _(35.0, "largest angle from the nadir")
-    lidar_divergence_mrad: NotNegative = _(1.5, "full angle of the beam")
-    lidar_range_noise_m: NotNegative = _(0.015, "standard deviation of one echo's range")
-    lidar_separation_m: NotNegative = _(0.5, "nearer echoes of a pulse merge")
-    lidar_returns: Annotated[int, Ge(1), Le(15)] = _(5, "returns that a pulse has at most")
-    paths_per_pixel: tuple[Annotated[int, Ge(1), Le(4096)], Annotated[int, Ge(1), Le(4096)]] = _(
+    water_cm: NotNegative = key(0.015, "equivalent water thickness", ZHAO)
+    shoot_length_m: Positive = key(0.16, "strips of needles that make up a shoot")
+    strip_width_m: Positive = key(0.02, "of these strips")
+    strips_per_shoot: Annotated[int, Ge(1), Le(20)] = key(4, "strips around the axis of a shoot")
+    slope: Annotated[float, Ge(0), Le(1)] = key(0.04, "of the mean ground, rise per metre")
+    wave_height_m: NotNegative = key(1.5, "greatest height of the ground's waves")
+    wave_length_m: Positive = key(30.0, "longest of these waves; the shortest is half as long")
+    terrain_step_m: Positive = key(0.25, "edge of the ground's triangles and of its colours")
+    soil_brightness: Share = key(0.55, "of the dry and the wet soil of prosail")
+    soil_moisture: Share = key(0.4, "mean over the ground")
+    litter_share: Share = key(0.4, "of the ground, under litter of needles; mean")
+    ground_variation: Share = key(0.2, "standard deviation of soil_moisture and litter_share")
+    lidar_height_m: Annotated[float, Ge(10)] = key(50.0, "of the UAV above the mean ground", ZHAO)
+    lidar_pulses_per_m2: Positive = key(
+        950.0, "about 2000 points per m² with several returns", ZHAO
+    )
+    lidar_line_spacing_m: Positive = key(17.5, "between parallel flight lines")
+    lidar_half_swath_deg: Annotated[float, Gt(0), Le(60)] = key(
+        35.0, "largest angle from the nadir"
+    )
+    lidar_divergence_mrad: NotNegative = key(1.5, "full angle of the beam")
+    lidar_range_noise_m: NotNegative = key(0.015, "standard deviation of one echo's range")
+    lidar_separation_m: NotNegative = key(0.5, "nearer echoes of a pulse merge")
+    lidar_returns: Annotated[int, Ge(1), Le(15)] = key(5, "returns that a pulse has at most")
+    paths_per_pixel: tuple[Annotated[int, Ge(1), Le(4096)], Annotated[int, Ge(1), Le(4096)]] = key(
         (12, 32), "of the observed images, visible and infrared: scattered more often there"
     )
-    relative_noise: NotNegative = _(0.01, "of the images: standard deviation over the value")
-    absolute_noise: NotNegative = _(0.001, "of the images: standard deviation, as reflectance")
+    relative_noise: NotNegative = key(0.01, "of the images: standard deviation over the value")
+    absolute_noise: NotNegative = key(0.001, "of the images: standard deviation, as reflectance")
 
 
 class Crowns(Section):
     """From a cloud to a scene: ground, crowns, sub-crowns, facets."""
 
-    crs: str = _("", "coordinate system of a cloud that names none, as in EPSG:25832")
-    noise_cell_m: Positive = _(2.0, "edge of the cells that tell isolated points")
-    noise_points: Annotated[int, Ge(0)] = _(5, "so few points in 27 cells are noise; 0: none are")
-    dem_pixel_m: Positive = _(0.5, "of the elevation model")
-    ground_cell_m: Positive = _(0.2, "the lowest point of each cell is shown to the cloth")
-    cloth_m: Positive = _(0.5, "distance of the cloth's knots", ZHANG)
-    ground_rigidness: Literal[1, 2, 3] = _(2, "of the cloth: 1 steep, 2 hilly, 3 flat", ZHANG)
-    ground_threshold_m: Positive = _(0.3, "from the cloth to ground points")
-    chm_pixel_m: Positive = _(0.25, "of the canopy heights, or the points' distance if larger")
-    chm_reach_m: NotNegative = _(2.0, "canopy height is not known farther from any point")
-    min_height_m: Positive = _(2.0, "least height of a crown's canopy")
-    smoothing_m: NotNegative = _(0.5, "standard deviation that smooths the canopy heights")
-    min_distance_m: Positive = _(1.0, "between the tops of two trees")
-    min_area_m2: NotNegative = _(1.5, "least area of a crown")
-    subcrown_area_m2: Positive = _(2.0, "wanted area of a sub-crown")
-    subcrown_points: Annotated[int, Ge(0)] = _(
+    crs: str = key("", "coordinate system of a cloud that names none, as in EPSG:25832")
+    noise_cell_m: Positive = key(2.0, "edge of the cells that tell isolated points")
+    noise_points: Annotated[int, Ge(0)] = key(5, "so few points in 27 cells are noise; 0: none are")
+    dem_pixel_m: Positive = key(0.5, "of the elevation model")
+    ground_cell_m: Positive = key(0.2, "the lowest point of each cell is shown to the cloth")
+    cloth_m: Positive = key(0.5, "distance of the cloth's knots", ZHANG)
+    ground_rigidness: Literal[1, 2, 3] = key(2, "of the cloth: 1 steep, 2 hilly, 3 flat", ZHANG)
+    ground_threshold_m: Positive = key(0.3, "from the cloth to ground points")
+    chm_pixel_m: Positive = key(0.25, "of the canopy heights, or the points' distance if larger")
+    chm_reach_m: NotNegative = key(2.0, "canopy height is not known farther from any point")
+    min_height_m: Positive = key(2.0, "least height of a crown's canopy")
+    smoothing_m: NotNegative = key(0.5, "standard deviation that smooths the canopy heights")
+    min_distance_m: Positive = key(1.0, "between the tops of two trees")
+    min_area_m2: NotNegative = key(1.5, "least area of a crown")
+    subcrown_area_m2: Positive = key(2.0, "wanted area of a sub-crown")
+    subcrown_points: Annotated[int, Ge(0)] = key(
         50, "points that a sub-crown needs: in a sparse cloud it gets larger"
     )
-    layers: Annotated[int, Ge(1), Le(10)] = _(3, "height layers of a crown", ZHAO)
-    base_share: Share = _(0.02, "share of a crown's points below its base: stems, shrubs")
-    min_leaf_height_m: Positive = _(0.5, "lower returns are ground")
-    voxel_m: Positive = _(0.2, "thinning for alpha shapes; voxels in which pulses are followed")
-    alpha_m: Positive = _(0.6, "radius of the alpha shapes")
-    alpha_spacings: NotNegative = _(3.0, "least radius, in mean distances of the cloud's points")
-    window_s: Positive = _(0.5, "time over which the sensor flies straight")
-    range_exponent: Annotated[float, Ge(0), Le(4)] = _(
+    layers: Annotated[int, Ge(1), Le(10)] = key(3, "height layers of a crown", ZHAO)
+    base_share: Share = key(0.02, "share of a crown's points below its base: stems, shrubs")
+    min_leaf_height_m: Positive = key(0.5, "lower returns are ground")
+    voxel_m: Positive = key(0.2, "thinning for alpha shapes; voxels in which pulses are followed")
+    alpha_m: Positive = key(0.6, "radius of the alpha shapes")
+    alpha_spacings: NotNegative = key(3.0, "least radius, in mean distances of the cloud's points")
+    window_s: Positive = key(0.5, "time over which the sensor flies straight")
+    range_exponent: Annotated[float, Ge(0), Le(4)] = key(
         2.0, "intensity falls with range to this power; 0: the instrument corrects it"
     )
-    ground_to_canopy_intensity: NotNegative = _(
+    ground_to_canopy_intensity: NotNegative = key(
         0.0, "of pulses on ground alone over those on canopy alone; 0: from single returns"
     )
-    projection: Annotated[float, Gt(0), Le(1)] = _(0.5, "G of the plants: spherical angles", ZHAO)
-    max_density_m2_m3: Positive = _(5.0, "plant area density where nothing passes")
-    clumping_index: Annotated[float, Gt(0), Le(1)] = _(
+    projection: Annotated[float, Gt(0), Le(1)] = key(0.5, "G of the plants: spherical angles", ZHAO)
+    max_density_m2_m3: Positive = key(5.0, "plant area density where nothing passes")
+    clumping_index: Annotated[float, Gt(0), Le(1)] = key(
         1.0, "effective over true plant area within a part: needles in shoots; 1: not corrected"
     )
-    wood_share: Share = _(
+    wood_share: Share = key(
         0.15, "of the plant area, which pulses cannot tell from leaves", "Gower et al. 1999"
     )
-    facet_area_m2: Positive = _(0.01, "square facets that fill sub-crowns", ZHAO)
-    terrain_step_m: Positive = _(1.0, "edge of the terrain's squares")
+    facet_area_m2: Positive = key(0.01, "square facets that fill sub-crowns", ZHAO)
+    terrain_step_m: Positive = key(1.0, "edge of the terrain's squares")
 
 
 class Images(Section):
     """Simulated images: paths, orders, the published acceleration."""
 
-    pixel_m: Positive = _(
+    pixel_m: Positive = key(
         0.25, "of the simulated images: wider than facets, or chance tilts tell what is sunlit"
     )
-    paths_per_pixel: Annotated[int, Ge(4), Le(65536)] = _(64, "light paths, at least")
-    least_paths: Count = _(16_000_000, "of a whole image: a small plot gets more per pixel")
-    columns: Annotated[int, Ge(4), Le(200)] = _(
+    paths_per_pixel: Annotated[int, Ge(4), Le(65536)] = key(64, "light paths, at least")
+    least_paths: Count = key(16_000_000, "of a whole image: a small plot gets more per pixel")
+    columns: Annotated[int, Ge(4), Le(200)] = key(
         32, "functions of the kind of path kept per pixel, for sun and sky each"
     )
-    max_orders: Annotated[int, Ge(2), Le(250)] = _(100, "most surfaces on a path")
-    bark_reflectance: tuple[Share, Share, Share, Share, Share] = _(
+    max_orders: Annotated[int, Ge(2), Le(250)] = key(100, "most surfaces on a path")
+    bark_reflectance: tuple[Share, Share, Share, Share, Share] = key(
         (0.115, 0.132, 0.157, 0.197, 0.278),
         "of wood, in the five bands; Semi-LESS takes their mean",
         "larch branches in the spectral database of LESS",
     )
-    absorption_levels: Annotated[int, Ge(4), Le(100)] = _(14, "Semi-LESS: leaves to fit to", ZHAO)
-    leaf_structure: Annotated[float, Ge(1), Le(3)] = _(1.5, "Semi-LESS: N of these leaves", ZHAO)
-    degree: Annotated[int, Ge(1), Le(12)] = _(6, "Semi-LESS: polynomials of the leaf albedo")
-    reference_soils: tuple[Share, Share, Share] = _(
+    absorption_levels: Annotated[int, Ge(4), Le(100)] = key(14, "Semi-LESS: leaves to fit to", ZHAO)
+    leaf_structure: Annotated[float, Ge(1), Le(3)] = key(1.5, "Semi-LESS: N of these leaves", ZHAO)
+    degree: Annotated[int, Ge(1), Le(12)] = key(6, "Semi-LESS: polynomials of the leaf albedo")
+    reference_soils: tuple[Share, Share, Share] = key(
         (0.2, 0.5, 0.8), "Semi-LESS: reflectance of three soils beside a black one"
     )
-    direct_renders: Annotated[int, Ge(2)] = _(30, "combinations rendered one by one, to compare")
-    direct_paths: Annotated[int, Ge(2)] = _(32, "paths per pixel of such a render")
-    speed_combinations: Count = _(1000, "combinations for which times are compared", ZHAO)
+    direct_renders: Annotated[int, Ge(2)] = key(30, "combinations rendered one by one, to compare")
+    direct_paths: Annotated[int, Ge(2)] = key(32, "paths per pixel of such a render")
+    speed_combinations: Count = key(1000, "combinations for which times are compared", ZHAO)
 
 
 class Retrieval(Section):
     """Leaves and soils to simulate, training set, network and map."""
 
-    models: tuple[Literal["collision_orders", "semi_less", "prosail"], ...] = _(
+    models: tuple[Literal["collision_orders", "semi_less", "prosail"], ...] = key(
         ("collision_orders", "semi_less", "prosail"), "what simulates the images to learn from"
     )
-    masks: tuple[Literal["sunlit", "all"], ...] = _(
+    masks: tuple[Literal["sunlit", "all"], ...] = key(
         ("sunlit", "all"), "canopy pixels that are averaged: sunlit ones, or all"
     )
-    map_pixel_m: Positive = _(3.0, "of training entries and map", ZHAO)
-    sunlit_nir: Share = _(0.25, "near-infrared reflectance above which a pixel is sunlit", ZHAO)
-    canopy_height_m: NotNegative = _(2.0, "least height of vegetation that counts as canopy")
-    min_share: Share = _(0.02, "chosen pixels that a map pixel must have, as a share of it")
-    combinations: Annotated[int, Ge(10)] = _(1400, "combinations of leaf and soil")
-    max_entries: Count = _(200_000, "entries kept of more, drawn by chance; 182,560 published")
-    n: GridRange = _((1.0, 2.5, 4), "leaf structure: least, most, levels of the grid", ZHAO)
-    chlorophyll_ug_cm2: GridRange = _((10.0, 70.0, 13), "chlorophyll a and b per leaf area", ZHAO)
-    chlorophyll_per_carotenoid: Positive = _(4.0, "carotenoids follow from chlorophyll", ZHAO)
-    anthocyanin_per_chlorophyll: NotNegative = _(
+    map_pixel_m: Positive = key(3.0, "of training entries and map", ZHAO)
+    sunlit_nir: Share = key(0.25, "near-infrared reflectance above which a pixel is sunlit", ZHAO)
+    canopy_height_m: NotNegative = key(2.0, "least height of vegetation that counts as canopy")
+    min_share: Share = key(0.02, "chosen pixels that a map pixel must have, as a share of it")
+    combinations: Annotated[int, Ge(10)] = key(1400, "combinations of leaf and soil")
+    max_entries: Count = key(200_000, "entries kept of more, drawn by chance; 182,560 published")
+    n: GridRange = key((1.0, 2.5, 4), "leaf structure: least, most, levels of the grid", ZHAO)
+    chlorophyll_ug_cm2: GridRange = key((10.0, 70.0, 13), "chlorophyll a and b per leaf area", ZHAO)
+    chlorophyll_per_carotenoid: Positive = key(4.0, "carotenoids follow from chlorophyll", ZHAO)
+    anthocyanin_per_chlorophyll: NotNegative = key(
         0.043,
         "PROSPECT-D: what green leaves hold; PROSPECT-5 counts it as chlorophyll",
         "larch and birch leaves in the spectral database of LESS",
     )
-    dry_matter_g_cm2: GridRange = _((0.0, 0.03, 4), "dry matter per leaf area", ZHAO)
-    water_cm: NotNegative = _(0.015, "equivalent water thickness", ZHAO)
-    brown: GridRange = _((0.0, 0.8, 5), "brown pigments", ZHAO)
-    soil_brightness: GridRange = _((0.01, 0.7, 4), "of the soil", ZHAO)
-    soil_moisture: GridRange = _((0.01, 0.78, 4), "of the soil, a share of saturation", ZHAO)
-    jitter_steps: NotNegative = _(0.5, "deviation of the jitter, in grid steps", ZHAO)
-    prospect_version: Literal["5", "D"] = _("D", "calibration of PROSPECT")
-    soil_vectors: str = _(
+    dry_matter_g_cm2: GridRange = key((0.0, 0.03, 4), "dry matter per leaf area", ZHAO)
+    water_cm: NotNegative = key(0.015, "equivalent water thickness", ZHAO)
+    brown: GridRange = key((0.0, 0.8, 5), "brown pigments", ZHAO)
+    soil_brightness: GridRange = key((0.01, 0.7, 4), "of the soil", ZHAO)
+    soil_moisture: GridRange = key((0.01, 0.78, 4), "of the soil, a share of saturation", ZHAO)
+    jitter_steps: NotNegative = key(0.5, "deviation of the jitter, in grid steps", ZHAO)
+    prospect_version: Literal["5", "D"] = key("D", "calibration of PROSPECT")
+    soil_vectors: str = key(
         "", "folder with GSV's DryVec.txt and SMVec.txt in data_dir; empty: prosail's two soils"
     )
-    leaf_angle_deg: Annotated[float, Ge(0), Le(90)] = _(57.0, "SAIL: mean angle; 57 is spherical")
-    hot_spot: Positive = _(0.01, "SAIL: leaf size over canopy height")
-    networks: tuple[Literal["robust", "published"], ...] = _(
+    leaf_angle_deg: Annotated[float, Ge(0), Le(90)] = key(57.0, "SAIL: mean angle; 57 is spherical")
+    hot_spot: Positive = key(0.01, "SAIL: leaf size over canopy height")
+    networks: tuple[Literal["robust", "published"], ...] = key(
         ("robust", "published"), "that learn from bands with errors, or from exact ones"
     )
-    relative_noise: NotNegative = _(
+    relative_noise: NotNegative = key(
         0.05, "robust: errors of each band and of all together, as a share of the value"
     )
-    absolute_noise: NotNegative = _(
+    absolute_noise: NotNegative = key(
         0.002, "robust: errors of each band and of all together, as reflectance"
     )
-    seeds: tuple[int, ...] = _((1, 2, 3), "one network each; the map is their mean")
-    hidden: tuple[Count, ...] = _((800, 400, 200), "widths of the first hidden layers", ZHAO)
-    block: Count = _(3, "hidden layers within the residual block", ZHAO)
-    learning_rate: Positive = _(0.001, "of Adam", ZHAO)
-    last_rate_share: Share = _(0.01, "share of the rate to which it falls, along a cosine")
-    weight_decay: NotNegative = _(0.001, "of Adam, decoupled from the gradient", ZHAO)
-    batch: Count = _(512, "entries of one step")
-    max_epochs: Count = _(10, "most passes over all entries")
-    patience: Count = _(5, "epochs without a better validation after which training stops")
-    test_share: Annotated[float, Gt(0), Lt(1)] = _(0.2, "of entries that test", ZHAO)
-    held_share: Annotated[float, Gt(0), Lt(0.5)] = _(
+    seeds: tuple[int, ...] = key((1, 2, 3), "one network each; the map is their mean")
+    hidden: tuple[Count, ...] = key((800, 400, 200), "widths of the first hidden layers", ZHAO)
+    block: Count = key(3, "hidden layers within the residual block", ZHAO)
+    learning_rate: Positive = key(0.001, "of Adam", ZHAO)
+    last_rate_share: Share = key(0.01, "share of the rate to which it falls, along a cosine")
+    weight_decay: NotNegative = key(0.001, "of Adam, decoupled from the gradient", ZHAO)
+    batch: Count = key(512, "entries of one step")
+    max_epochs: Count = key(10, "most passes over all entries")
+    patience: Count = key(5, "epochs without a better validation after which training stops")
+    test_share: Annotated[float, Gt(0), Lt(1)] = key(0.2, "of entries that test", ZHAO)
+    held_share: Annotated[float, Gt(0), Lt(0.5)] = key(
         0.1, "of combinations that validate, and as many that test: none of them teaches"
     )
-    interval_level: Annotated[float, Gt(0), Lt(1)] = _(0.9, "truths that an interval holds")
-    range_quantile: Annotated[float, Gt(0), Lt(1)] = _(
+    interval_level: Annotated[float, Gt(0), Lt(1)] = key(0.9, "truths that an interval holds")
+    range_quantile: Annotated[float, Gt(0), Lt(1)] = key(
         0.999, "of entries that lie within the training range"
     )
 
@@ -241,9 +246,8 @@ class Retrieval(Section):
 class Chlorophyll(Section):
     """Leaf chlorophyll from UAV images and UAV LiDAR."""
 
-    enabled: bool = _(False, "map leaf chlorophyll instead of light")
-    plots: tuple[Literal["larch", "spruce", "user"], ...] = _(("larch", "spruce"), "plots to map")
-    margin_m: NotNegative = _(10.0, "surroundings of a plot that shade it")
+    plots: tuple[Literal["larch", "spruce", "user"], ...] = key(("larch", "spruce"), "plots to map")
+    margin_m: NotNegative = key(10.0, "surroundings of a plot that shade it")
     larch: Plot = Plot(shoot_recollision=0.06)
     spruce: Plot = Plot(
         size_m=(20.0, 30.0),

@@ -31,7 +31,7 @@ rule observed_cells:
     benchmark:
         benchmarks("observed_cells_{plot}")
     conda:
-        "../envs/dapple.yaml"
+        "../../envs/dapple.yaml"
     threads: 1
     resources:
         mem_mb=2000,
@@ -39,9 +39,9 @@ rule observed_cells:
         **SELECTION,
         pixel_m=CHLOROPHYLL.images.pixel_m,
     message:
-        "{settings.experiment}: average the observed images of {wildcards.plot}"
+        said("average the observed images of {wildcards.plot}")
     script:
-        "../scripts/observed_cells.py"
+        "../../scripts/observed_cells.py"
 
 
 rule training_set:
@@ -58,7 +58,7 @@ rule training_set:
     benchmark:
         benchmarks("training_set_{plot}_{model}")
     conda:
-        "../envs/dapple.yaml"
+        "../../envs/dapple.yaml"
     threads: 1
     resources:
         mem_mb=4000,
@@ -74,9 +74,9 @@ rule training_set:
         model="{model}",
         seed=lambda wildcards: stream("combinations", wildcards.plot),
     message:
-        "{settings.experiment}: training set of {wildcards.plot} by {wildcards.model}"
+        said("training set of {wildcards.plot} by {wildcards.model}")
     script:
-        "../scripts/training_set.py"
+        "../../scripts/training_set.py"
 
 
 rule network:
@@ -94,7 +94,7 @@ rule network:
     benchmark:
         benchmarks("network_{plot}_{model}_{mask}_{network}")
     conda:
-        "../envs/dapple.yaml"
+        "../../envs/dapple.yaml"
     threads: 1
     resources:
         mem_mb=2000,
@@ -106,9 +106,11 @@ rule network:
         options=NETWORK,
         range_ug_cm2=RETRIEVAL.chlorophyll_ug_cm2[:2],
     message:
-        "{settings.experiment}: {wildcards.network} networks of {wildcards.plot}, {wildcards.model}, {wildcards.mask} pixels"
+        said(
+            "{wildcards.network} networks of {wildcards.plot}, {wildcards.model}, {wildcards.mask} pixels"
+        )
     script:
-        "../scripts/network.py"
+        "../../scripts/network.py"
 
 
 rule lcc_map:
@@ -125,7 +127,7 @@ rule lcc_map:
     benchmark:
         benchmarks("lcc_map_{plot}_{model}")
     conda:
-        "../envs/dapple.yaml"
+        "../../envs/dapple.yaml"
     threads: 1
     resources:
         mem_mb=2000,
@@ -138,9 +140,9 @@ rule lcc_map:
         level=RETRIEVAL.interval_level,
         range_quantile=RETRIEVAL.range_quantile,
     message:
-        "{settings.experiment}: chlorophyll of {wildcards.plot} by {wildcards.model}"
+        said("chlorophyll of {wildcards.plot} by {wildcards.model}")
     script:
-        "../scripts/lcc_map.py"
+        "../../scripts/lcc_map.py"
 
 
 rule accuracy:
@@ -160,7 +162,7 @@ rule accuracy:
     benchmark:
         benchmarks("accuracy_{plot}_{model}")
     conda:
-        "../envs/dapple.yaml"
+        "../../envs/dapple.yaml"
     threads: 1
     resources:
         mem_mb=2000,
@@ -172,9 +174,9 @@ rule accuracy:
         split_seed=split_seed,
         errors=ERRORS,
     message:
-        "{settings.experiment}: accuracy of {wildcards.model} in {wildcards.plot}"
+        said("accuracy of {wildcards.model} in {wildcards.plot}")
     script:
-        "../scripts/accuracy.py"
+        "../../scripts/accuracy.py"
 
 
 rule accuracy_table:
@@ -194,14 +196,14 @@ rule accuracy_table:
     benchmark:
         benchmarks("accuracy_table")
     conda:
-        "../envs/dapple.yaml"
+        "../../envs/dapple.yaml"
     threads: 1
     resources:
         mem_mb=500,
     message:
-        "{settings.experiment}: accuracy of all models"
+        said("accuracy of all models")
     script:
-        "../scripts/accuracy_table.py"
+        "../../scripts/accuracy_table.py"
 
 
 rule chlorophyll_figures:
@@ -235,13 +237,13 @@ rule chlorophyll_figures:
     benchmark:
         benchmarks("chlorophyll_figures_{plot}")
     conda:
-        "../envs/dapple.yaml"
+        "../../envs/dapple.yaml"
     threads: 1
     resources:
         mem_mb=1500,
     params:
         taught=TAUGHT,
     message:
-        "{settings.experiment}: figures of {wildcards.plot}"
+        said("figures of {wildcards.plot}")
     script:
-        "../scripts/chlorophyll_figures.py"
+        "../../scripts/chlorophyll_figures.py"

@@ -28,7 +28,7 @@ rule image_coefficients:
     benchmark:
         benchmarks("image_coefficients_{plot}")
     conda:
-        "../envs/dapple.yaml"
+        "../../envs/dapple.yaml"
     threads: 2
     resources:
         mem_mb=3000,
@@ -43,9 +43,9 @@ rule image_coefficients:
         variant=f"{VARIANT}_rgb",
         seed=lambda wildcards: stream("image_coefficients", wildcards.plot),
     message:
-        "{settings.experiment}: trace the light of the pixels of {wildcards.plot}"
+        said("trace the light of the pixels of {wildcards.plot}")
     script:
-        "../scripts/image_coefficients.py"
+        "../../scripts/image_coefficients.py"
 
 
 rule image_semiless:
@@ -60,7 +60,7 @@ rule image_semiless:
     benchmark:
         benchmarks("image_semiless_{plot}")
     conda:
-        "../envs/dapple.yaml"
+        "../../envs/dapple.yaml"
     threads: 1
     resources:
         mem_mb=2000,
@@ -72,9 +72,9 @@ rule image_semiless:
         bark=IMAGES.bark_reflectance,
         soils=IMAGES.reference_soils,
     message:
-        "{settings.experiment}: fit Semi-LESS to the images of {wildcards.plot}"
+        said("fit Semi-LESS to the images of {wildcards.plot}")
     script:
-        "../scripts/image_semiless.py"
+        "../../scripts/image_semiless.py"
 
 
 rule image_comparison:
@@ -96,7 +96,7 @@ rule image_comparison:
     benchmark:
         benchmarks("image_comparison_{plot}")
     conda:
-        "../envs/dapple.yaml"
+        "../../envs/dapple.yaml"
     threads: 2
     resources:
         mem_mb=3000,
@@ -111,9 +111,9 @@ rule image_comparison:
         variant=f"{VARIANT}_rgb",
         seed=lambda wildcards: stream("image_comparison", wildcards.plot),
     message:
-        "{settings.experiment}: render {wildcards.plot} directly, to compare"
+        said("render {wildcards.plot} directly, to compare")
     script:
-        "../scripts/image_comparison.py"
+        "../../scripts/image_comparison.py"
 
 
 rule image_speed:
@@ -132,13 +132,13 @@ rule image_speed:
     benchmark:
         benchmarks("image_speed")
     conda:
-        "../envs/dapple.yaml"
+        "../../envs/dapple.yaml"
     threads: 1
     resources:
         mem_mb=500,
     params:
         plots=CHLOROPHYLL.plots,
     message:
-        "{settings.experiment}: time and error of simulated images"
+        said("time and error of simulated images")
     script:
-        "../scripts/image_speed.py"
+        "../../scripts/image_speed.py"

@@ -26,7 +26,7 @@ rule plot_world:
     benchmark:
         benchmarks("plot_world_{plot}")
     conda:
-        "../envs/dapple.yaml"
+        "../../envs/dapple.yaml"
     threads: 1
     resources:
         mem_mb=1500,
@@ -48,9 +48,9 @@ rule plot_world:
         origin_m=WORLD.origin_m,
         seed=lambda wildcards: stream("plot_world", wildcards.plot),
     message:
-        "{settings.experiment}: grow the {wildcards.plot} plot"
+        said("grow the {wildcards.plot} plot")
     script:
-        "../scripts/plot_world.py"
+        "../../scripts/plot_world.py"
 
 
 rule plot_lidar:
@@ -68,7 +68,7 @@ rule plot_lidar:
     benchmark:
         benchmarks("plot_lidar_{plot}")
     conda:
-        "../envs/dapple.yaml"
+        "../../envs/dapple.yaml"
     threads: 2
     resources:
         mem_mb=6000,
@@ -78,9 +78,9 @@ rule plot_lidar:
         origin_m=WORLD.origin_m,
         seed=lambda wildcards: stream("plot_lidar", wildcards.plot),
     message:
-        "{settings.experiment}: scan the {wildcards.plot} plot from a UAV"
+        said("scan the {wildcards.plot} plot from a UAV")
     script:
-        "../scripts/plot_lidar.py"
+        "../../scripts/plot_lidar.py"
 
 
 rule plot_images:
@@ -98,7 +98,7 @@ rule plot_images:
     benchmark:
         benchmarks("plot_images_{plot}")
     conda:
-        "../envs/dapple.yaml"
+        "../../envs/dapple.yaml"
     threads: 2
     resources:
         mem_mb=5000,
@@ -115,6 +115,6 @@ rule plot_images:
         origin_m=WORLD.origin_m,
         seed=lambda wildcards: stream("plot_images", wildcards.plot),
     message:
-        "{settings.experiment}: photograph the {wildcards.plot} plot"
+        said("photograph the {wildcards.plot} plot")
     script:
-        "../scripts/plot_images.py"
+        "../../scripts/plot_images.py"

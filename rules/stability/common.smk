@@ -19,7 +19,7 @@ STABILITY_LARGE = {"angular_step": 5000, "leaf_size": 5000}
 
 WORSENED = [name for name in COMPARED if name != "truth"]
 
-if STABILITY.enabled:
+if settings.study == "stability":
     from dapple.light.series import DIRECT_SHARE
     from dapple.stability import stressors as dapple_stressors
 
@@ -95,9 +95,3 @@ def stability_batches():
         for stressor in STABILITY_STRESSORS
         for world in STABILITY_WORLDS
     ]
-
-
-def stability_model():
-    """The fitted verdict; none before one was fitted to a first map."""
-    path = Path("scripts/dapple/verdict/verdict_model.json")
-    return str(path) if (Path(workflow.basedir) / path).is_file() else []

@@ -29,7 +29,7 @@ rule plot_ground:
     benchmark:
         benchmarks("plot_ground_{plot}")
     conda:
-        "../envs/dapple.yaml"
+        "../../envs/dapple.yaml"
     threads: 1
     resources:
         mem_mb=4000,
@@ -46,9 +46,9 @@ rule plot_ground:
         chm_pixel_m=CROWNS.chm_pixel_m,
         reach_m=CROWNS.chm_reach_m,
     message:
-        "{settings.experiment}: ground and canopy height of {wildcards.plot}"
+        said("ground and canopy height of {wildcards.plot}")
     script:
-        "../scripts/plot_ground.py"
+        "../../scripts/plot_ground.py"
 
 
 rule plot_crowns:
@@ -63,7 +63,7 @@ rule plot_crowns:
     benchmark:
         benchmarks("plot_crowns_{plot}")
     conda:
-        "../envs/dapple.yaml"
+        "../../envs/dapple.yaml"
     threads: 1
     resources:
         mem_mb=1000,
@@ -78,9 +78,9 @@ rule plot_crowns:
         least_points=CROWNS.subcrown_points,
         seed=lambda wildcards: stream("sub_crowns", wildcards.plot),
     message:
-        "{settings.experiment}: crowns and sub-crowns of {wildcards.plot}"
+        said("crowns and sub-crowns of {wildcards.plot}")
     script:
-        "../scripts/plot_crowns.py"
+        "../../scripts/plot_crowns.py"
 
 
 rule plot_scene:
@@ -102,7 +102,7 @@ rule plot_scene:
     benchmark:
         benchmarks("plot_scene_{plot}")
     conda:
-        "../envs/dapple.yaml"
+        "../../envs/dapple.yaml"
     threads: 2
     resources:
         mem_mb=6000,
@@ -127,6 +127,6 @@ rule plot_scene:
         },
         seed=lambda wildcards: stream("facets", wildcards.plot),
     message:
-        "{settings.experiment}: fill the crowns of {wildcards.plot} with facets"
+        said("fill the crowns of {wildcards.plot} with facets")
     script:
-        "../scripts/plot_scene.py"
+        "../../scripts/plot_scene.py"

@@ -33,7 +33,7 @@ PLANNED_FROM = (
     }
 )
 
-if SURVEY.enabled:
+if settings.study == "survey":
     from dapple.survey.checks import check
 
     try:

@@ -1,0 +1,26 @@
+"""Plant area density in voxels."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from dapple.config.base import FREY, Count, LeafAngles, NotNegative, Positive, Section, key
+
+
+class Voxels(Section):
+    """Plant area density."""
+
+    sizes_m: tuple[Positive, ...] = key((0.2, 1.0), "edges of the voxels", FREY)
+    estimator: Literal["transmittance", "ppl", "fpl", "fpl_biased", "contact_frequency"] = key(
+        "fpl", "bias-corrected free path length", "Pimont et al. 2018"
+    )
+    leaf_angle_distribution: LeafAngles = key("spherical", "of the leaf normals", FREY)
+    single_leaf_area_m2: NotNegative = key(0.0, "finite-element correction; 0: none")
+    max_pad_m2_m3: Positive = key(5.0, "cap of plant area density", "AMAPVox")
+    min_shots: Count = key(5, "fewer shots leave a voxel unknown", "AMAPVox")
+    contact_voxel_m: NotNegative = key(
+        0.05, "sub-voxels of the contact frequency; 0: none", "Hosoi and Omasa 2006"
+    )
+    beam_divergence_mrad: NotNegative = key(0.0, "weight shots by their beam's section; 0: equally")
+    beam_diameter_m: NotNegative = key(0.0, "beam's diameter at the scanner, for that weight")
+    allow_missing_misses: bool = key(False, "go on where every shot of a scan has a return")
