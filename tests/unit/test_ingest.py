@@ -8,10 +8,9 @@ from dapple import frames
 from dapple.cloud import ingest, lattice
 from dapple.cloud.lattice import ScanFrame
 from dapple.cloud.ordered import shots_from_ptx
-from dapple.errors import EmptyCloudError, InputError, MissingMissesError
+from dapple.errors import EmptyCloudError, InputError
 from dapple.formats import clouds
 from dapple.formats.clouds import Cloud
-from dapple.formats.shots import Shots
 
 TILT = (1.1, -0.7, 48.0)
 FRAME = ScanFrame(301, 180, (30.0, 120.0), (0.0, 358.0), TILT)
@@ -168,26 +167,6 @@ def test_level_scanners_need_no_more_than_positions_and_step():
     misses = [((shots.scan == k) & (shots.n_returns == 0)).sum() for k in (1, 2)]
     assert misses == pytest.approx(empty, rel=0.01)
     assert [fact["scan"] for fact in facts] == [1, 2]
-
-
-def test_points_without_empty_shots_stop_the_estimate_of_density(rebuilt):
-    with pytest.raises(MissingMissesError, match=r"tree.txt: found points only.*Export PTX"):
-        ingest.require_misses(None, "tree.txt")
-    shots = rebuilt[-2]
-    assert ingest.require_misses(shots, "scan.laz") is shots
-    hits = shots.n_returns > 0
-    only_hits = Shots(
-        shots.origin_m[hits],
-        shots.direction[hits],
-        shots.scan[hits],
-        np.append(shots.first[:-1][hits], len(shots.range_m)),
-        shots.range_m,
-        shots.reflectance_db,
-        shots.deviation,
-        shots.world_origin_m,
-    )
-    with pytest.raises(MissingMissesError, match="no shot without a return in scan 4"):
-        ingest.require_misses(only_hits, "scan.laz")
 
 
 def test_a_handful_of_points_is_no_scan():

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 from dapple.errors import EmptyCloudError, InputError
 from dapple.formats.meshes import Mesh
 from dapple.virtual.leaf_shapes import draw_normals, fans
-from dapple.virtual.leaves import along_wood, element_centres, occupancy
+from dapple.virtual.leaves import along_wood
 
 SMALL = {"leaf_area_m2": 2.0, "n_elements": 2000, "crown_base_m": 1.0, "height_m": 2.2}
 
@@ -39,6 +39,10 @@ def leaves(wood):
     return along_wood(wood, **SMALL, seed=3)
 
 
+def voxels_with_leaves(leaves, size_m):
+    return len(np.unique(np.floor(leaves.element_centre_m / size_m), axis=0))
+
+
 def test_area_and_number_of_polygons_are_as_asked(leaves):
     assert leaves.area_m2 == pytest.approx(2.0, rel=1e-9)
     assert leaves.n_elements == 2000
@@ -46,7 +50,7 @@ def test_area_and_number_of_polygons_are_as_asked(leaves):
 
 
 def test_every_polygon_has_a_voxel_of_its_own(leaves):
-    assert occupancy(leaves)["n_voxels_0.05"] == 2000
+    assert voxels_with_leaves(leaves, 0.05) == 2000
 
 
 def test_the_small_share_are_hexagons_a_third_of_the_voxel_wide(leaves):
@@ -63,10 +67,10 @@ def test_polygons_are_flat_and_convex(leaves):
 
 
 def test_leaves_stay_between_crown_base_and_height_and_near_wood(wood, leaves):
-    centre = element_centres(leaves)
+    centre = leaves.element_centre_m
     assert centre[:, 2].min() > 1.0 + wood.vertices_m[:, 2].min() - 1e-9
     assert centre[:, 2].max() < 2.2 + wood.vertices_m[:, 2].min()
-    distance, _ = cKDTree(element_centres(wood)).query(centre)
+    distance, _ = cKDTree(wood.element_centre_m).query(centre)
     # a polygon moves towards the middle of its voxel, at most half a diagonal
     assert distance.max() < 0.3 + 0.05 * np.sqrt(3) / 2
 
@@ -79,7 +83,7 @@ def test_thick_wood_carries_fewer_leaves_than_thin_wood(wood):
             along_wood(wood, **sparse, thin_wood_m2=thin_wood_m2, seed=seed) for seed in range(8)
         ]
         # the branch is at 2 m, and shoots are at most 0.3 m long
-        return np.mean([(element_centres(p)[:, 2] < 1.65).mean() for p in placements])
+        return np.mean([(p.element_centre_m[:, 2] < 1.65).mean() for p in placements])
 
     assert share_on_stem(0.001) < 0.5 * share_on_stem(1.0)
 
@@ -88,7 +92,7 @@ def test_a_seed_gives_the_same_bytes_and_another_seed_another_placement(wood, le
     again, other = along_wood(wood, **SMALL, seed=3), along_wood(wood, **SMALL, seed=4)
     assert again.vertices_m.tobytes() == leaves.vertices_m.tobytes()
     assert again.faces.tobytes() == leaves.faces.tobytes()
-    same = np.isin(*(np.round(element_centres(m)[:, 0], 6) for m in (leaves, other)))
+    same = np.isin(*(np.round(m.element_centre_m[:, 0], 6) for m in (leaves, other)))
     assert same.mean() < 0.05
 
 
@@ -96,7 +100,7 @@ def test_more_leaves_on_a_shoot_leave_larger_gaps(wood):
     few, many = (
         np.mean(
             [
-                occupancy(along_wood(wood, **SMALL, leaves_per_shoot=n, seed=seed))["n_voxels_0.2"]
+                voxels_with_leaves(along_wood(wood, **SMALL, leaves_per_shoot=n, seed=seed), 0.2)
                 for seed in range(3)
             ]
         )
@@ -149,6 +153,6 @@ def test_a_fan_has_its_area_centre_and_normal():
     area, corners = rng.uniform(1e-4, 2e-3, 50), rng.integers(3, 9, 50)
     mesh = fans(centre, normal, area, corners, rng.uniform(0.5, 0.9, 50), rng)
     assert mesh.element_area_m2 == pytest.approx(area, rel=1e-9)
-    assert element_centres(mesh) == pytest.approx(centre, abs=1e-9)
+    assert mesh.element_centre_m == pytest.approx(centre, abs=1e-9)
     assert mesh.element_normal == pytest.approx(normal, abs=1e-6)
     assert np.bincount(mesh.element).tolist() == (corners - 2).tolist()

@@ -61,11 +61,11 @@ def shots_by_half(few=50, many=5000):
 def test_the_hidden_half_of_a_random_medium_gets_its_area_back():
     rng = np.random.default_rng(1)
     true = medium(rng)
-    upper = occlusion.element_centre_m(true)[:, 2] > 1.0
+    upper = true.element_centre_m[:, 2] > 1.0
     seen = some(true, ~upper | (rng.random(true.n_elements) < 0.3))
     corrected = occlusion.correct(seen, voxels(DENSITY, shots_by_half()), seed=1)
     assert corrected.area_m2 == pytest.approx(true.area_m2, rel=0.02)
-    added = occlusion.element_centre_m(corrected)[seen.n_elements :]
+    added = corrected.element_centre_m[seen.n_elements :]
     # Copies keep their size and lie in the cells that lack them, evenly.
     assert (added[:, 2] > 1.0).mean() > 0.97
     assert added[added[:, 2] > 1.0].mean(axis=0) == pytest.approx([1.0, 1.0, 1.5], abs=0.03)

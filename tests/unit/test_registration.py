@@ -128,16 +128,3 @@ def test_times_are_split_into_before_and_after():
 def test_a_split_that_leaves_nothing_to_report_or_to_fit_is_an_error(share):
     with pytest.raises(InputError, match="leaves one part empty"):
         split(["1_1", "1_2"], pd.date_range("2023-08-10", periods=4, tz="UTC"), share=share)
-
-
-@pytest.mark.parametrize("by", ["sensor", "time"])
-def test_a_record_belongs_to_the_part_of_its_sensor_and_time(by):
-    times = pd.date_range("2023-08-10 10:00", periods=4, freq="h", tz="UTC")
-    sensors = ["1_1", "1_2", "2_1"]
-    parts = split(sensors, times, by=by, share=0.5, seed=1)
-    table = pd.DataFrame(
-        {"sensor": np.repeat(sensors, 4), "time": list(times + pd.Timedelta(minutes=5)) * 3}
-    )
-    assert np.array_equal(
-        parts.reports(table["sensor"], table["time"]).reshape(3, 4), parts.reporting
-    )

@@ -64,20 +64,16 @@ def test_a_missing_table_is_refused(tmp_path):
         sensors.read(tmp_path / "none.csv")
 
 
-def test_a_grid_is_centred_in_its_bounds():
-    grid = sensors.grid((-1.0, 0.0, 1.2, 0.5), spacing_m=0.5, height_m=0.1, ground_z_m=3.0)
+def test_a_grid_is_centred_where_it_should_be():
+    grid = sensors.grid_around(
+        (0.1, 0.25), columns=5, rows=2, spacing_m=0.5, height_m=0.1, ground_z_m=3.0
+    )
     assert len(grid) == 5 * 2
     assert sorted(set(grid["x_m"].round(6))) == [-0.9, -0.4, 0.1, 0.6, 1.1]
     assert sorted(set(grid["y_m"])) == [0.0, 0.5]
     assert set(grid["z_m"]) == {3.1}
     assert not grid["sensor"].duplicated().any()
     assert grid["sensor"].iloc[[0, 4, 9]].tolist() == ["1_1", "1_5", "2_5"]
-
-
-def test_a_grid_needs_bounds_and_a_spacing_that_make_sense():
-    for bounds, spacing in (((1, 0, 0, 1), 1.0), ((0, 0, 1, 1), 0.0)):
-        with pytest.raises(InputError, match="positive spacing"):
-            sensors.grid(bounds, spacing, 0.1)
 
 
 def test_the_distance_to_a_triangle_is_that_to_its_face_edge_or_corner():

@@ -9,7 +9,7 @@ from dapple.formats import voxel_grids as files
 from dapple.formats.meshes import Mesh
 from dapple.formats.shots import Shots
 from dapple.structure import summary
-from dapple.structure.returns import kinds_by_place, kinds_of_classes
+from dapple.structure.returns import kinds_by_place
 from dapple.structure.voxels import Grid, accumulate, estimate, plant_area_density
 
 
@@ -343,7 +343,6 @@ def test_returns_are_what_the_classified_cloud_is_where_they_lie():
     points = np.array([[0.52, 0.01, 0.01], [1.02, 0.0, 0.0], [1.03, 0.0, 0.0], [1.04, 0.0, 0.0]])
     kinds = kinds_by_place(points, np.array([4, 0, 0, 4]), voxel_size_m=0.05)
     assert kinds(shots).tolist() == [0, 1, 2, 2]
-    assert kinds_of_classes(np.array([4, 0, 2, 7])).tolist() == [0, 1, 1, 2]
 
 
 @pytest.mark.parametrize(

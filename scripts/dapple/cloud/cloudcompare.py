@@ -35,7 +35,11 @@ class Engine(Protocol):
     version: str
 
     def inliers(self, xyz_m: np.ndarray, neighbours: int, multiplier: float) -> np.ndarray:
-        """(k,) ascending indices of the points that are no statistical outliers."""
+        """(k,) ascending indices of the points that are no statistical outliers.
+
+        The mean distance of an outlier to its nearest neighbours, the point itself not counted,
+        exceeds the mean over all points by more than `multiplier` standard deviations.
+        """
 
     def distance_to_mesh(self, xyz_m: np.ndarray, mesh: Mesh) -> np.ndarray:
         """(n,) float64 distance of each point to the nearest place on the mesh [m]."""
@@ -64,7 +68,7 @@ class CommandLine:
         self.version = "unknown"  # CloudCompare tells it only in the files that it writes
 
     def inliers(self, xyz_m: np.ndarray, neighbours: int, multiplier: float) -> np.ndarray:
-        """See `statistical_inliers`."""
+        """See `Engine`."""
         with tempfile.TemporaryDirectory(prefix="cloudcompare-") as folder:
             given, kept = Path(folder, "given.ply"), Path(folder, "kept.ply")
             write_points(given, xyz_m - _middle(xyz_m))
@@ -73,7 +77,7 @@ class CommandLine:
             return _rows(*_columns(self._read(kept), ("scalar_RowHigh", "scalar_RowLow")))
 
     def distance_to_mesh(self, xyz_m: np.ndarray, mesh: Mesh) -> np.ndarray:
-        """See `cloud_to_mesh_distance`."""
+        """See `Engine`."""
         with tempfile.TemporaryDirectory(prefix="cloudcompare-") as folder:
             given, surface = Path(folder, "given.ply"), Path(folder, "mesh.ply")
             result = Path(folder, "result.ply")
@@ -121,7 +125,7 @@ class CloudComPy:
         self.version = str(getattr(cloudComPy, "__version__", "unknown"))
 
     def inliers(self, xyz_m: np.ndarray, neighbours: int, multiplier: float) -> np.ndarray:
-        """See `statistical_inliers`."""
+        """See `Engine`."""
         with tempfile.TemporaryDirectory(prefix="cloudcompy-") as folder:
             cloud = self._load(Path(folder, "given.ply"), xyz_m - _middle(xyz_m))
         kept = self._module.CloudSamplingTools.sorFilter(
@@ -134,7 +138,7 @@ class CloudComPy:
         )
 
     def distance_to_mesh(self, xyz_m: np.ndarray, mesh: Mesh) -> np.ndarray:
-        """See `cloud_to_mesh_distance`."""
+        """See `Engine`."""
         module = self._module
         points_m, vertices_m = _tilted(xyz_m, mesh.vertices_m)
         with tempfile.TemporaryDirectory(prefix="cloudcompy-") as folder:
@@ -153,34 +157,6 @@ class CloudComPy:
     def _load(self, path: Path, xyz_m: np.ndarray):
         write_points(path, xyz_m)
         return self._module.loadPointCloud(str(path))
-
-
-def statistical_inliers(
-    xyz_m: np.ndarray,
-    *,
-    neighbours: int = 8,
-    multiplier: float = 3.0,
-    program: str = "CloudCompare",
-) -> np.ndarray:
-    """Find the points that are not statistical outliers.
-
-    Parameters
-    ----------
-    xyz_m : (n, 3) float64
-        Local frame [m].
-    neighbours : int
-        Number of nearest neighbours, the point itself not counted.
-    multiplier : float
-        The limit is mean + multiplier × standard deviation of all mean distances.
-    program : str
-        CloudCompare's name or path.
-
-    Returns
-    -------
-    (k,) int64
-        Ascending indices of the points that stay.
-    """
-    return engine(program).inliers(xyz_m, neighbours, multiplier)
 
 
 def cloud_to_mesh_distance(

@@ -11,50 +11,10 @@ import numpy as np
 
 from dapple.cloud import lattice
 from dapple.cloud.lattice import ScanFrame
-from dapple.errors import EmptyCloudError, InputError, MissingMissesError
+from dapple.errors import EmptyCloudError, InputError
 from dapple.formats import shots as shots_format
 from dapple.formats.clouds import Cloud
 from dapple.formats.shots import Shots
-
-HOW_TO_GET_MISSES = (
-    "Export PTX (it keeps them), or give the scanner's angular frame (scan_frame: number of "
-    "directions, angles, tilt) so that they can be rebuilt."
-)
-
-
-def require_misses(shots: Shots | None, source: str | Path) -> Shots:
-    """The shots themselves, or an error if they cannot tell empty from unseen.
-
-    Parameters
-    ----------
-    shots : Shots or None
-        None where there are only points.
-    source : str or Path
-        The file to name.
-
-    Raises
-    ------
-    MissingMissesError
-        No shots, or a scan in which every shot has a return.
-    """
-    if shots is None:
-        raise MissingMissesError(
-            source,
-            "points only",
-            "every shot of the scanner, also those that met nothing",
-            HOW_TO_GET_MISSES,
-        )
-    with_misses = np.unique(shots.scan[shots.n_returns == 0])
-    without = np.setdiff1d(np.unique(shots.scan), with_misses)
-    if len(without) or not len(shots):
-        listed = ", ".join(str(scan) for scan in without[:8]) or "all of them"
-        raise MissingMissesError(
-            source,
-            f"no shot without a return in scan {listed} ({len(shots):,} shots)",
-            "every shot of the scanner, also those that met nothing",
-            HOW_TO_GET_MISSES,
-        )
-    return shots
 
 
 def shots_from_scan(

@@ -48,6 +48,15 @@ class Mesh:
         return np.bincount(self.element, self.triangle_area_m2, self.n_elements)
 
     @property
+    def element_centre_m(self) -> np.ndarray:
+        """(n_elements, 3) centres of gravity: the mean of the triangles' weighted by area [m]."""
+        middle_m, area_m2 = self.vertices_m[self.faces].mean(axis=1), self.triangle_area_m2
+        moment = [
+            np.bincount(self.element, area_m2 * middle_m[:, k], self.n_elements) for k in range(3)
+        ]
+        return np.stack(moment, axis=1) / self.element_area_m2[:, None]
+
+    @property
     def element_normal(self) -> np.ndarray:
         """(n_elements, 3) unit normals, the mean of the triangles' weighted by area."""
         axes = [
@@ -105,11 +114,6 @@ def read_ply(path: str | Path) -> Mesh:
         there.
     """
     return Mesh(*ply.read(path)[:3])
-
-
-def read_ply_origin(path: str | Path) -> np.ndarray:
-    """(3,) world coordinates of the local origin that the file names, else zeros [m]."""
-    return ply.read(path)[3]
 
 
 def write_obj(path: str | Path, mesh: Mesh, axes: str) -> None:

@@ -1,4 +1,4 @@
-"""NetCDF of what was traced: counted paths, and the share of the sun that sensors see."""
+"""NetCDF of counted paths."""
 
 from pathlib import Path
 
@@ -8,7 +8,6 @@ from dapple.errors import InputError
 from dapple.formats.atomic import atomic
 from dapple.formats.netcdf import read as read_netcdf
 from dapple.light.tensor import Transport
-from dapple.light.visibility import Sunlit
 
 ROWS = {
     "sensor": "index of the sensor where the paths start",
@@ -22,11 +21,6 @@ SENSORS = {
     "cut": "paths given up at max_orders, of all replicates",
 }
 SKY = "share of the sky patch that the sensor sees, weighted by the cosine"
-SUNLIT = {
-    "share": ("share of the solar disc that is seen", ("replicate", "sensor", "time")),
-    "standard_error": ("standard error of the share", ("sensor", "time")),
-    "n_rays": ("shadow rays of each replicate", ("sensor", "time")),
-}
 
 
 def write(path: str | Path, transport: Transport) -> None:
@@ -60,21 +54,6 @@ def read(path: str | Path) -> Transport:
     dataset = _read(path, names, ("max_orders",))
     columns = {name: dataset[name].to_numpy() for name in names}
     return Transport(**columns, max_orders=int(dataset.attrs["max_orders"]))
-
-
-def write_sunlit(path: str | Path, sunlit: Sunlit) -> None:
-    """Write what sensors see of the sun, whole or not at all."""
-    variables = {
-        name: (dims, getattr(sunlit, name), {"units": "1", "long_name": text})
-        for name, (text, dims) in SUNLIT.items()
-    }
-    _write(path, xr.Dataset(variables))
-
-
-def read_sunlit(path: str | Path) -> Sunlit:
-    """Read what sensors see of the sun as `write_sunlit` writes it."""
-    dataset = _read(path, list(SUNLIT), ())
-    return Sunlit(**{name: dataset[name].to_numpy() for name in SUNLIT})
 
 
 def _write(path: str | Path, dataset: xr.Dataset) -> None:

@@ -28,8 +28,6 @@ class Split:
     ----------
     fitting, reporting : (sensor, time) bool
         Disjoint, together everything.
-    sensors, times : sequence of str, DatetimeIndex
-        The axes of the masks.
     fitting_part, reporting_part : str
         The two parts in words, with the sensors or the times in them.
     """
@@ -38,18 +36,6 @@ class Split:
     reporting: np.ndarray
     fitting_part: str
     reporting_part: str
-    sensors: Sequence[str]
-    times: pd.DatetimeIndex
-
-    def reports(self, sensor: pd.Series, time: pd.Series) -> np.ndarray:
-        """Which rows of a table of records belong to the reporting part.
-
-        Sensors that the split does not know report; a time between two known ones belongs to the
-        earlier.
-        """
-        row = pd.Index(self.sensors).get_indexer(sensor)
-        column = np.clip(self.times.searchsorted(time, side="right") - 1, 0, None)
-        return np.where(row < 0, True, self.reporting[row, column])
 
 
 @dataclass(frozen=True)
@@ -138,7 +124,7 @@ def split(
             for mask in (chosen, ~chosen)
         )
         fitting = np.broadcast_to(chosen[:, None], (n, len(times))).copy()
-    return Split(fitting, ~fitting, *words, sensors, times)
+    return Split(fitting, ~fitting, *words)
 
 
 def register(

@@ -78,7 +78,7 @@ class RenderScene:
         """
         beam = channels(beam_normal, self.n_bands, fill=0.0)
         self._parameters["sun.irradiance.value"] = self.mi.Color3f(*beam.tolist())
-        self._parameters["sun.to_world"] = self.mi.Transform4f(_looking(self.mi, -direction))
+        self._parameters["sun.to_world"] = self.mi.Transform4f(facing(self.mi, -direction))
         self._parameters.update()
 
     def set_sky(
@@ -223,12 +223,8 @@ def build(
     shape = (rows, 2 * (rows - 1))
     content = {
         "type": "scene",
-        "sun": {
-            "type": "directional",
-            "to_world": _looking(mi, np.array([0.0, 0.0, -1.0])),
-            "irradiance": {"type": "rgb", "value": [0.0, 0.0, 0.0]},
-        },
-        "sky": _sky(mi, shape),
+        "sun": dark_sun(mi),
+        "sky": sky_emitter(mi, shape),
         "ground": {
             "type": "disk",
             "to_world": _affine(mi, _below(scene, grid), ground_radius_m),
@@ -268,13 +264,14 @@ def mesh_shapes(mi: ModuleType, meshes: dict[str, Mesh], colour: dict[str, Any])
         for kind, name in lambertian.items()
     }
     return {
-        f"{kind}_mesh": _mesh(mi, kind, mesh, mi.load_dict(bsdf[kind]))
+        f"{kind}_mesh": triangles(mi, kind, mesh, mi.load_dict(bsdf[kind]))
         for kind, mesh in meshes.items()
         if len(mesh.faces)
     }
 
 
-def _mesh(mi: ModuleType, name: str, mesh: Mesh, bsdf: Any) -> Any:
+def triangles(mi: ModuleType, name: str, mesh: Mesh, bsdf: Any) -> Any:
+    """A Mitsuba mesh without shading normals, every triangle of one BSDF."""
     properties = mi.Properties()
     properties["bsdf"] = bsdf
     properties["face_normals"] = True
@@ -326,14 +323,23 @@ def _affine(mi: ModuleType, shift_m: np.ndarray, scale: float | np.ndarray) -> A
     return transform.translate(np.asarray(shift_m).tolist()) @ transform.scale(scale)
 
 
-def _looking(mi: ModuleType, way: np.ndarray) -> Any:
+def facing(mi: ModuleType, way: np.ndarray) -> Any:
     """Transform that turns Mitsuba's z axis to the unit vector `way`."""
     aside = [0.0, 1.0, 0.0] if abs(way[2]) > 0.7 else [0.0, 0.0, 1.0]
     target = np.asarray(way).tolist()
     return mi.ScalarTransform4f().look_at(origin=[0.0, 0.0, 0.0], target=target, up=aside)
 
 
-def _sky(mi: ModuleType, shape: tuple[int, int]) -> dict:
+def dark_sun(mi: ModuleType) -> dict:
+    """Parallel light from the zenith, without light until it is set."""
+    return {
+        "type": "directional",
+        "to_world": facing(mi, np.array([0.0, 0.0, -1.0])),
+        "irradiance": {"type": "rgb", "value": [0.0, 0.0, 0.0]},
+    }
+
+
+def sky_emitter(mi: ModuleType, shape: tuple[int, int]) -> dict:
     """A sky map whose axes (x, y up, -z at azimuth 0) are turned to east, up, north."""
     turn = [[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]]
     return {

@@ -73,43 +73,6 @@ def read(path: str | Path, origin_m: Sequence[float] = (0.0, 0.0, 0.0)) -> pd.Da
     return local.assign(sensor=labels)[["sensor", *POSITION]].reset_index(drop=True)
 
 
-def grid(
-    bounds_m: Sequence[float], spacing_m: float, height_m: float, ground_z_m: float = 0.0
-) -> pd.DataFrame:
-    """Fill a rectangle with a regular grid of sensors, centred in it.
-
-    Parameters
-    ----------
-    bounds_m : (4,) float
-        West, south, east and north edge in the local frame [m].
-    spacing_m : float
-        Distance between neighbours [m].
-    height_m, ground_z_m : float
-        Height of the sensors above the ground, and of the ground [m].
-
-    Returns
-    -------
-    pandas.DataFrame
-        `sensor`, `x_m`, `y_m`, `z_m`; labels `row_column`, both from 1, from the southwest.
-
-    Raises
-    ------
-    InputError
-        No positive spacing or a rectangle turned inside out.
-    """
-    west, south, east, north = bounds_m
-    if not (spacing_m > 0 and west <= east and south <= north):
-        raise InputError(
-            "sensor grid",
-            f"bounds {tuple(bounds_m)} and spacing {spacing_m} m",
-            "west ≤ east, south ≤ north and a positive spacing",
-            "Mend the bounds or the spacing.",
-        )
-    columns, rows = (int((b - a) / spacing_m + 1e-9) + 1 for a, b in ((west, east), (south, north)))
-    centre = (0.5 * (west + east), 0.5 * (south + north))
-    return grid_around(centre, columns, rows, spacing_m, height_m, ground_z_m)
-
-
 def grid_around(
     centre_m: Sequence[float],
     columns: int,

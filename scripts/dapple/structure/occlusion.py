@@ -80,7 +80,7 @@ def correct(
     if not len(cells):
         return leaves
     rng = np.random.default_rng(seed)
-    area_m2, centre_m = leaves.element_area_m2, element_centre_m(leaves)
+    area_m2, centre_m = leaves.element_area_m2, leaves.element_centre_m
     middle_m = corner_m + (cells + 0.5) * size_m
     k = min(n_donors, leaves.n_elements)
     near = cKDTree(centre_m).query(middle_m, k)[1].reshape(len(cells), k)
@@ -228,13 +228,6 @@ def area_by_cell(
     flat = np.ravel_multi_index(tuple(index[inside].T), shape)
     area = np.bincount(flat, mesh.triangle_area_m2[inside], int(np.prod(shape)))
     return area.reshape(shape)
-
-
-def element_centre_m(mesh: Mesh) -> np.ndarray:
-    """(n_elements, 3) mean of each element's triangles, weighted by area."""
-    middle_m, area = mesh.vertices_m[mesh.faces].mean(axis=1), mesh.triangle_area_m2
-    sums = [np.bincount(mesh.element, area * middle_m[:, k], mesh.n_elements) for k in range(3)]
-    return np.stack(sums, axis=1) / mesh.element_area_m2[:, None]
 
 
 def _classes(

@@ -12,12 +12,6 @@ Kinds = Callable[[Shots], np.ndarray] | np.ndarray | None
 """A function of a chunk, an array for the returns of all chunks, or None: all are leaf hits."""
 
 
-def kinds_of_classes(classes: np.ndarray) -> np.ndarray:
-    """Kinds of returns from class codes: 4 is leaf, 7 noise, everything else stops like wood."""
-    classes = np.asarray(classes)
-    return np.where(classes == 4, HIT, np.where(classes == 7, NOISE, WOOD)).astype(np.uint8)
-
-
 def kinds_by_place(
     points_m: np.ndarray, classes: np.ndarray, *, voxel_size_m: float
 ) -> Callable[[Shots], np.ndarray]:

@@ -13,7 +13,13 @@ from dapple.errors import InputError
 from dapple.formats.shots import Shots
 from dapple.structure import leaf_angles, occlusion, returns
 from dapple.structure.returns import Kinds
-from dapple.structure.traversal import HIT, _clip, _nearest, _next_facet, _start
+from dapple.structure.traversal import (
+    HIT,
+    entry_and_exit,
+    nearest_facet,
+    next_facet,
+    start_march,
+)
 from dapple.structure.voxels import CAPPED
 
 DENSITY = "plant_area_density_m2_m3"
@@ -316,12 +322,12 @@ def _depths(origin, direction, first, range_m, some, g, density, corner, size, d
         i = some[n]
         inverse, facet, index = np.empty(3), np.empty(3), np.empty(3, np.int64)
         j, end = first[i], first[i + 1]
-        near, far = _clip(origin[i], direction[i], corner, shape, size)
+        near, far = entry_and_exit(origin[i], direction[i], corner, shape, size)
         total = 0.0
         if near < far:
-            _start(origin[i], direction[i], corner, shape, size, near, inverse, index, facet)
+            start_march(origin[i], direction[i], corner, shape, size, near, inverse, index, facet)
             while True:
-                k = _nearest(facet)
+                k = nearest_facet(facet)
                 leave = max(facet[k], near)
                 sigma = g[n] * density[index[0], index[1], index[2]]
                 while j < end and range_m[j] < leave:
@@ -332,7 +338,7 @@ def _depths(origin, direction, first, range_m, some, g, density, corner, size, d
                 index[k] += 1 if inverse[k] > 0.0 else -1
                 if index[k] < 0 or index[k] >= shape[k]:
                     break
-                facet[k] = _next_facet(origin[i], inverse, corner, size, index[k], k)
+                facet[k] = next_facet(origin[i], inverse, corner, size, index[k], k)
         while j < end:
             depth[j] = total
             j += 1

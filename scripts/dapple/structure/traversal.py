@@ -18,7 +18,7 @@ _SEGMENT = 2048
 
 
 @njit(cache=True)
-def _clip(origin, direction, corner, shape, size):
+def entry_and_exit(origin, direction, corner, shape, size):
     """Distances at which a ray enters and leaves the grid; none where the first is larger."""
     near, far = 0.0, math.inf
     for k in range(3):
@@ -33,7 +33,7 @@ def _clip(origin, direction, corner, shape, size):
 
 
 @njit(cache=True)
-def _next_facet(origin, inverse, corner, size, index, k):
+def next_facet(origin, inverse, corner, size, index, k):
     """Distance at which the ray leaves the slab `index` of axis k.
 
     From the facet's own coordinate, so that rounding does not add up along the ray.
@@ -45,17 +45,18 @@ def _next_facet(origin, inverse, corner, size, index, k):
 
 
 @njit(cache=True)
-def _start(origin, direction, corner, shape, size, distance, inverse, index, facet):
+def start_march(origin, direction, corner, shape, size, distance, inverse, index, facet):
     """Set up the march at a distance along the ray."""
     for k in range(3):
         inverse[k] = 1.0 / direction[k] if direction[k] != 0.0 else math.inf
         place = math.floor((origin[k] + direction[k] * distance - corner[k]) / size)
         index[k] = min(max(int(place), 0), shape[k] - 1)
-        facet[k] = _next_facet(origin, inverse, corner, size, index[k], k)
+        facet[k] = next_facet(origin, inverse, corner, size, index[k], k)
 
 
 @njit(cache=True)
-def _nearest(facet):
+def nearest_facet(facet):
+    """Axis of the facet that a ray meets first, of their distances along it (3,)."""
     k = 0 if facet[0] <= facet[1] else 1
     return k if facet[k] <= facet[2] else 2
 
@@ -147,19 +148,19 @@ def _march(
     j, end = first[i], first[i + 1]
     is_miss = j == end
     share = 0.0 if is_miss else 1.0 / (end - j)
-    distance, far = _clip(o, d, corner, shape, size)
+    distance, far = entry_and_exit(o, d, corner, shape, size)
     while j < end and range_m[j] < distance:
         j += 1
     if not distance < far or (j == end and not is_miss):
         return
-    _start(o, d, corner, shape, size, distance, inverse, index, facet)
+    start_march(o, d, corner, shape, size, distance, inverse, index, facet)
     part, near = 0, 1e-9 * size
     if n_parts > 0:
         part = _start_parts(
             o, d, corner, size, n_parts, distance, inverse, index, place, fine, step, move
         )
     while True:
-        k = _nearest(facet)
+        k = nearest_facet(facet)
         leave = facet[k]
         if leave - distance > near:  # a beam through an edge enters no voxel beside it
             voxel = (index[0] * shape[1] + index[1]) * shape[2] + index[2]
@@ -206,7 +207,7 @@ def _march(
         if n_parts > 0:  # from the last part of one voxel to the first of the next
             part -= (n_parts - 1) * move[k]
             fine[k] = leave + step[k]
-        facet[k] = _next_facet(o, inverse, corner, size, index[k], k)
+        facet[k] = next_facet(o, inverse, corner, size, index[k], k)
 
 
 @njit(cache=True, parallel=True)

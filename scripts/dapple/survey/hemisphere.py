@@ -13,7 +13,7 @@ from dapple.formats.meshes import concatenate
 from dapple.formats.shots import Shots
 from dapple.streams import stream_seed
 from dapple.virtual.scanner_beam import beam_pattern, sub_rays
-from dapple.virtual.scanner_world import World, _mitsuba_mesh, trace
+from dapple.virtual.scanner_world import World, mitsuba_mesh, trace
 from dapple.virtual.stands import Stand
 
 CHUNK_BEAMS = 1 << 16
@@ -154,7 +154,7 @@ def world_of(stand: Stand) -> World:
     centre = np.append(0.5 * stand.size_m[:2], 0.0)
     scene = {"type": "scene"}
     for k, plant in enumerate(stand.plants):
-        mesh = _mitsuba_mesh(mi, concatenate([plant.leaves, plant.wood]), np.zeros(3))
+        mesh = mitsuba_mesh(mi, concatenate([plant.leaves, plant.wood]), np.zeros(3))
         scene[f"plant_{k}"] = {"type": "shapegroup", "mesh": mesh}
     for tree, grown in enumerate(stand.grown):
         matrix = stand.placement(tree)

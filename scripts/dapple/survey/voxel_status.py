@@ -5,7 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit, prange
 
-from dapple.structure.traversal import _clip, _nearest, _next_facet, _start
+from dapple.structure.traversal import (
+    entry_and_exit,
+    nearest_facet,
+    next_facet,
+    start_march,
+)
 from dapple.survey.hemisphere import Beams
 
 N_BLOCKS = 4
@@ -80,7 +85,7 @@ def _follow(origin, direction, range_m, bits, size, hit, passed, any_face):
         inverse, facet, index = np.empty(3), np.empty(3), np.empty(3, np.int64)
         for i in range(block * n // n_blocks, (block + 1) * n // n_blocks):
             d, bit = direction[i], bits[i]
-            distance, far = _clip(origin, d, corner, shape, size)
+            distance, far = entry_and_exit(origin, d, corner, shape, size)
             following = 0
             while following < n_returns and range_m[i, following] < distance:
                 following += 1
@@ -88,10 +93,10 @@ def _follow(origin, direction, range_m, bits, size, hit, passed, any_face):
             ended = following > 0 and (following == n_returns or range_m[i, following] == np.inf)
             if not distance < far or ended:
                 continue
-            _start(origin, d, corner, shape, size, distance, inverse, index, facet)
+            start_march(origin, d, corner, shape, size, distance, inverse, index, facet)
             entered = _entry_axis(origin, d, distance, size, shape)
             while True:
-                k = _nearest(facet)
+                k = nearest_facet(facet)
                 leave = facet[k]
                 x, y, z = index[0], index[1], index[2]
                 is_hit = following < n_returns and range_m[i, following] < leave
@@ -109,4 +114,4 @@ def _follow(origin, direction, range_m, bits, size, hit, passed, any_face):
                 index[k] += 1 if inverse[k] > 0.0 else -1
                 if index[k] < 0 or index[k] >= shape[k]:
                     break
-                facet[k] = _next_facet(origin, inverse, corner, size, index[k], k)
+                facet[k] = next_facet(origin, inverse, corner, size, index[k], k)

@@ -72,7 +72,7 @@ def distance_to_polygons(
     if not len(leafy):
         return math.nan
     xyz = cloud.xyz_m[rng.choice(leafy, min(points, len(leafy)), replace=False, shuffle=False)]
-    middle = occlusion.element_centre_m(leaves)
+    middle = leaves.element_centre_m
     near = cKDTree(middle, balanced_tree=False, compact_nodes=False).query(xyz)[1]
     normal = leaves.element_normal[near]
     away = np.abs(((xyz - middle[near]) * normal).sum(axis=1))

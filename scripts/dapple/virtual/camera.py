@@ -17,7 +17,7 @@ from dapple.formats.meshes import Mesh
 from dapple.frames import direction_from_angles
 from dapple.scene import patterns
 from dapple.scene.mitsuba_plugins import register
-from dapple.scene.mitsuba_scene import RenderScene, _looking, _mesh, _sky
+from dapple.scene.mitsuba_scene import RenderScene, dark_sun, sky_emitter, triangles
 from dapple.streams import stream_seed
 from dapple.virtual.plot_optics import Materials
 
@@ -112,14 +112,9 @@ def build(mesh: Mesh, materials: Materials, *, variant: str = "llvm_ad_rgb") -> 
     shape = (181, 360)
     content = {
         "type": "scene",
-        "sun": {
-            "type": "directional",
-            "to_world": _looking(mi, np.array([0.0, 0.0, -1.0])),
-            "irradiance": {"type": "rgb", "value": [0.0, 0.0, 0.0]},
-            "sampling_weight": SUN_WEIGHT,
-        },
-        "sky": _sky(mi, shape) | {"sampling_weight": 1.0},
-        "world": _mesh(mi, "world", mesh, bsdf),
+        "sun": dark_sun(mi) | {"sampling_weight": SUN_WEIGHT},
+        "sky": sky_emitter(mi, shape) | {"sampling_weight": 1.0},
+        "world": triangles(mi, "world", mesh, bsdf),
     }
     low, high = mesh.vertices_m[:, 2].min(), mesh.vertices_m[:, 2].max()
     render = RenderScene(mi, mi.load_dict(content), 3, float(low), variant, 0.0, shape)

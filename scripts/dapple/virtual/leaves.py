@@ -1,7 +1,7 @@
 """Virtual leaf polygons along real wood, where the leaves themselves are not known."""
 
 import numpy as np
-from scipy.spatial import ConvexHull, cKDTree
+from scipy.spatial import cKDTree
 
 from dapple.errors import EmptyCloudError, InputError
 from dapple.formats.meshes import Mesh
@@ -114,45 +114,9 @@ def along_wood(
     )
 
 
-def occupancy(leaves: Mesh, sizes_m: tuple[float, ...] = (0.05, 0.2, 1.0)) -> dict:
-    """How a placement fills space, to hold against a scan's figures.
-
-    Parameters
-    ----------
-    leaves : Mesh
-        Leaf polygons.
-    sizes_m : tuple of float
-        Voxel sizes to count with [m].
-
-    Returns
-    -------
-    dict
-        `n_voxels_{size}` that hold the centre of a polygon, `crown_projection_m2` (convex hull)
-        [m²], `lowest_z_m` and `highest_z_m` of the corners [m].
-    """
-    centre_m = element_centres(leaves)
-    facts = {
-        f"n_voxels_{size:g}": len(np.unique(np.floor(centre_m / size), axis=0)) for size in sizes_m
-    }
-    z_m = leaves.vertices_m[:, 2]
-    return facts | {
-        "crown_projection_m2": float(ConvexHull(leaves.vertices_m[:, :2]).volume),
-        "lowest_z_m": float(z_m.min()),
-        "highest_z_m": float(z_m.max()),
-    }
-
-
-def element_centres(mesh: Mesh) -> np.ndarray:
-    """Centres of gravity of the elements, (n_elements, 3) [m]."""
-    middle = mesh.vertices_m[mesh.faces].mean(axis=1)
-    weight = mesh.triangle_area_m2
-    moment = [np.bincount(mesh.element, weight * middle[:, k], mesh.n_elements) for k in range(3)]
-    return np.stack(moment, axis=1) / mesh.element_area_m2[:, None]
-
-
 def _positions(wood, n, voxel_m, between_m, max_distance_m, clump_m, thin_m2, n_tries, rng):
     """A point in each of n voxels, and how many points fell into each voxel in all."""
-    centre_m, area_m2 = element_centres(wood), wood.element_area_m2
+    centre_m, area_m2 = wood.element_centre_m, wood.element_area_m2
     nearest = cKDTree(centre_m)
     vigour = 1 / (1 + (area_m2 / thin_m2) ** 2)
     lowest_m, highest_m = between_m

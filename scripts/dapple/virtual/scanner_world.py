@@ -92,7 +92,7 @@ def build(
     mi = engine.load()
     return World(
         mi,
-        mi.load_dict({"type": "scene", "world": _mitsuba_mesh(mi, whole, centre_m)}),
+        mi.load_dict({"type": "scene", "world": mitsuba_mesh(mi, whole, centre_m)}),
         centre_m,
         normal.astype(np.float32),
         np.concatenate(brightness),
@@ -125,7 +125,7 @@ def trace(world: World, rays: np.ndarray, max_range_m: float) -> tuple[np.ndarra
     return np.array(hit.t), np.array(hit.prim_index)
 
 
-def _mitsuba_mesh(mi: ModuleType, mesh: Mesh, shift_m: np.ndarray) -> object:
+def mitsuba_mesh(mi: ModuleType, mesh: Mesh, shift_m: np.ndarray) -> object:
     """A Mitsuba mesh without shading normals."""
     result = mi.Mesh("world", len(mesh.vertices_m), len(mesh.faces))
     parameters = mi.traverse(result)
