@@ -17,9 +17,9 @@ import yaml
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
 from dapple.config.settings import Settings, validate
-from dapple.formats import json, meshes
+from dapple.formats import json, meshes, tables
 from dapple.light import series, transport, visibility
-from dapple.scene import scene_optics, sensors, traced
+from dapple.scene import scene_optics, traced
 from dapple.scene.surfaces import Scene
 from dapple.sky.sky_radiance import sky_dataset
 from dapple.sky.sun import Site, broadband
@@ -68,7 +68,7 @@ class Run:
         self.settings: Settings = validate(yaml.safe_load((folder / "config.yaml").read_text()))
         self.registration = json.read(folder / "registration/registration.json")
         self.optics = scene_optics.read(folder / "sky/optics.nc")
-        table = sensors.read_local(folder / "sky/sensors.csv")
+        table = tables.read(folder / "sky/sensors.csv")
         records = measured.read(Path(self.settings.data_dir) / self.settings.measured.path)
         self.records = records[~records["sensor"].isin(self.registration["fitting_sensors"])]
         self.sensors = table[table["sensor"].isin(self.records["sensor"])].reset_index(drop=True)

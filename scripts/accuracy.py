@@ -3,8 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from dapple.formats import geojson, json, rasters
-from dapple.formats.atomic import atomic
+from dapple.formats import geojson, json, rasters, tables
 from dapple.retrieval import evaluation, intervals, maps, network, training_entries
 from dapple.retrieval.noise import Noise
 from dapple.workflow import run
@@ -26,17 +25,16 @@ def main(snakemake):
             interval["factor"], interval["level"],
         )  # fmt: skip
         networks = [network.read(path) for path in network_paths]
-        rows, some = simulated(pd.read_parquet(table_path), networks, interval, params)
+        rows, some = simulated(tables.read(table_path), networks, interval, params)
         field_rows, table = field(map_path, inputs.crowns, params.seeds)
         scores += [{"plot": params.plot} | taught | row for row in [*rows, *field_rows]]
         trees.append(table.assign(plot=params.plot, **taught))
         shown.append(some.assign(**taught))
     scores = pd.DataFrame(scores)
     extra = scores.columns.difference(evaluation.COLUMNS, sort=False)
-    write(scores[[*evaluation.COLUMNS, *extra]], snakemake.output.accuracy)
-    write(pd.concat(trees), snakemake.output.trees)
-    with atomic(snakemake.output.tests) as partial:
-        pd.concat(shown).to_parquet(partial, index=False)
+    tables.write(snakemake.output.accuracy, scores[[*evaluation.COLUMNS, *extra]])
+    tables.write(snakemake.output.trees, pd.concat(trees))
+    tables.write(snakemake.output.tests, pd.concat(shown))
 
 
 def simulated(frame, networks, interval, params):
@@ -93,11 +91,6 @@ def field(map_path, crowns_path, seeds):
     }
     rows = [{"test_set": "field", "n_without_pixels": int(missing.sum())} | row for row in rows]
     return rows, table
-
-
-def write(table, path):
-    with atomic(path) as partial:
-        table.to_csv(partial, index=False, float_format="%.6g")
 
 
 if __name__ == "__main__":

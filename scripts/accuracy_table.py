@@ -4,14 +4,14 @@ import shutil
 
 import pandas as pd
 
+from dapple.formats import tables
 from dapple.formats.atomic import atomic
 from dapple.workflow import run
 
 
 def main(snakemake):
-    table = pd.concat([pd.read_csv(path) for path in snakemake.input.accuracy])
-    with atomic(snakemake.output.accuracy) as partial:
-        table.to_csv(partial, index=False, float_format="%.6g")
+    table = pd.concat([tables.read(path) for path in snakemake.input.accuracy])
+    tables.write(snakemake.output.accuracy, table)
     with atomic(snakemake.output.map) as partial:
         shutil.copyfile(snakemake.input.map, partial)
     print(table[table["seed"] == "mean"].to_string(index=False))

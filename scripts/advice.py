@@ -7,10 +7,10 @@ import numpy as np
 import yaml
 
 from dapple.advice import cheapest, refinements
-from dapple.formats import json, netcdf, voxel_grids
+from dapple.formats import json, netcdf, tables, voxel_grids
 from dapple.formats.atomic import atomic
 from dapple.light import light_model, series
-from dapple.scene import scene_files, scene_optics, sensors, traced
+from dapple.scene import scene_files, scene_optics, traced
 from dapple.scene.surfaces import Scene
 from dapple.times import label
 from dapple.workflow import run
@@ -19,7 +19,7 @@ from dapple.workflow import run
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
     sky, optics = netcdf.read(inputs.sky), scene_optics.read(inputs.optics)
-    table = sensors.read_local(inputs.sensors)
+    table = tables.read(inputs.sensors)
     lit = np.flatnonzero(series.open_sky_par(sky).to_numpy() > 0)
     chosen = light_model.spread(len(table), params.sensors)
     moments = lit[light_model.spread(len(lit), params.times)]

@@ -1,7 +1,6 @@
 """Transport engine against the per-timestep engine, at the times that both have."""
 
-from dapple.formats import netcdf
-from dapple.formats.atomic import atomic
+from dapple.formats import netcdf, tables
 from dapple.light.series import open_sky_par
 from dapple.stats import agreement
 from dapple.workflow import run
@@ -19,8 +18,7 @@ def main(snakemake):
         rows[name] = agreement.compare(
             netcdf.read(fast).sel(time=times), reference, sky.sel(time=times)
         )
-    with atomic(snakemake.output.agreement) as partial:
-        agreement.table(rows).to_csv(partial, index=False, float_format="%.6g")
+    tables.write(snakemake.output.agreement, agreement.table(rows))
 
 
 if __name__ == "__main__":

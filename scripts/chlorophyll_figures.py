@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from dapple.figures import chlorophyll_maps, style
-from dapple.formats import geojson, rasters
+from dapple.formats import geojson, rasters, tables
 from dapple.retrieval import training_entries
 from dapple.workflow import run
 
@@ -13,22 +13,22 @@ QUANTILES = {"low": 0.05, "middle": 0.5, "high": 0.95}
 
 def main(snakemake):
     inputs, output, params = snakemake.input, snakemake.output, snakemake.params
-    accuracy = pd.concat([pd.read_csv(path) for path in inputs.accuracy])
+    accuracy = pd.concat([tables.read(path) for path in inputs.accuracy])
     accuracy = accuracy[accuracy["seed"].astype(str) == "ensemble"]
-    tests = pd.concat([pd.read_parquet(path) for path in inputs.tests])
+    tests = pd.concat([tables.read(path) for path in inputs.tests])
     own = accuracy[accuracy["test_set"] == "entries"]
     style.save(chlorophyll_maps.simulated(tests, own), output.simulated)
-    trees = pd.concat([pd.read_csv(path) for path in inputs.trees])
+    trees = pd.concat([tables.read(path) for path in inputs.trees])
     own = accuracy[accuracy["test_set"] == "field"]
     style.save(chlorophyll_maps.field(trees, own), output.field)
     entries = {
-        path: quantiles(pd.read_parquet(path, columns=list(training_entries.BANDS)), taught)
+        path: quantiles(tables.read(path)[list(training_entries.BANDS)], taught)
         for path, taught in zip(inputs.training, params.taught, strict=True)
     }
-    figure = chlorophyll_maps.spectra(pd.read_csv(inputs.pixels), pd.concat(entries.values()))
+    figure = chlorophyll_maps.spectra(tables.read(inputs.pixels), pd.concat(entries.values()))
     style.save(figure, output.spectra)
     histories = [
-        pd.read_csv(path).assign(**taught)
+        tables.read(path).assign(**taught)
         for path, taught in zip(inputs.histories, params.taught, strict=True)
     ]
     style.save(chlorophyll_maps.losses(pd.concat(histories)), output.losses)

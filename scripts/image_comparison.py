@@ -6,8 +6,7 @@ import time
 import numpy as np
 import pandas as pd
 
-from dapple.formats import json
-from dapple.formats.atomic import atomic
+from dapple.formats import json, tables
 from dapple.frames import direction_from_angles
 from dapple.retrieval import coefficient_files as files
 from dapple.retrieval import coefficients as collision
@@ -34,14 +33,14 @@ def main(snakemake):
     reference, seconds, n_paths = renders(scene, traced, properties, light, params)
     direct_peak_mb = peak_mb()
     found = methods(traced, fitted, properties, light)
-    tables = [
+    errors = [
         comparison.compare(means, reference, BANDS).assign(method=name, reference="direct")
         for name, means in found.items()
     ]
-    tables += structures(traced, fitted, light, params)
-    table = pd.concat(tables)[["method", "reference", *tables[0].columns[:-2]]]
-    write(snakemake.output.comparison, table)
-    write(snakemake.output.renders, per_combination(drawn, properties, reference, found))
+    errors += structures(traced, fitted, light, params)
+    table = pd.concat(errors)[["method", "reference", *errors[0].columns[:-2]]]
+    tables.write(snakemake.output.comparison, table)
+    tables.write(snakemake.output.renders, per_combination(drawn, properties, reference, found))
     print(table.to_string())
     speeds = speed(traced, fitted, light, params, inputs)
     worst = table[(table.reference == "direct") & (table.scale == "image")].groupby("method")
@@ -56,7 +55,7 @@ def main(snakemake):
     fast = pd.DataFrame(speeds, columns=names)
     fast["rmse_vs_direct"] = fast.method.map(worst.rmse.max())
     fast["max_vs_direct"] = fast.method.map(worst["max"].max())
-    write(snakemake.output.speed, fast)
+    tables.write(snakemake.output.speed, fast)
     print(fast.to_string())
     print(
         f"direct: {len(seconds)} renders of {n_paths} paths a pixel took {each:.2f} s each, times "
@@ -113,18 +112,18 @@ def optics_of(properties):
 
 def structures(traced, fitted, light, params):
     """Semi-LESS against collision orders of the same paths, so without noise, for single N."""
-    tables = []
+    found = []
     for structure in STRUCTURES:
         seed = stream_seed(params["seed"], "structure")
         _, properties = spectra.combinations(
             params["leaves_and_soils"], PER_STRUCTURE, seed=seed, n=structure
         )
-        found = methods(traced, fitted, properties, light)
-        exact = found["collision_orders"]
+        means = methods(traced, fitted, properties, light)
+        exact = means["collision_orders"]
         exact = comparison.Means(exact.cells, np.zeros_like(exact.variance), exact.pixels)
-        table = comparison.compare(found["semi_less"], exact, BANDS)
-        tables.append(table.assign(method=f"semi_less_n_{structure}", reference="collision_orders"))
-    return tables
+        table = comparison.compare(means["semi_less"], exact, BANDS)
+        found.append(table.assign(method=f"semi_less_n_{structure}", reference="collision_orders"))
+    return found
 
 
 def per_combination(drawn, properties, reference, found):
@@ -179,11 +178,6 @@ def speed(traced, fitted, light, params, inputs):
 
 def peak_mb():
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-
-
-def write(path, table):
-    with atomic(path) as partial:
-        table.to_csv(partial, index=False, float_format="%.6g")
 
 
 if __name__ == "__main__":

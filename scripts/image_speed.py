@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from dapple.formats.atomic import atomic
+from dapple.formats import tables
 from dapple.workflow import run
 
 
@@ -13,12 +13,11 @@ def main(snakemake):
         (snakemake.input.comparison, snakemake.output.comparison),
     ):
         parts = [
-            pd.read_csv(path).assign(plot=plot)
+            tables.read(path).assign(plot=plot)
             for plot, path in zip(params.plots, paths, strict=True)
         ]
         table = pd.concat(parts)
-        with atomic(output) as partial:
-            table[["plot", *table.columns[:-1]]].to_csv(partial, index=False)
+        tables.write(output, table[["plot", *table.columns[:-1]]], None)
         print(table.to_string())
 
 

@@ -3,9 +3,8 @@
 from dataclasses import asdict, replace
 
 import numpy as np
-import pandas as pd
 
-from dapple.formats import json, rasters
+from dapple.formats import json, rasters, tables
 from dapple.retrieval import intervals, maps, network, training_entries
 from dapple.retrieval.noise import Noise
 from dapple.workflow import run
@@ -21,7 +20,7 @@ def main(snakemake):
     for taught, table_path, network_paths, observed_path, map_path, interval_path in files:
         networks = [network.read(path) for path in network_paths]
         noise = Noise(**params.errors) if taught["network"] == "robust" else None
-        interval, known = calibrate(pd.read_parquet(table_path), networks, noise, params)
+        interval, known = calibrate(tables.read(table_path), networks, noise, params)
         observed = rasters.read(observed_path)
         bands = rasters.select(observed, training_entries.BANDS, observed_path).values
         layers, each = maps.retrieve(networks, interval, known, bands)

@@ -1,8 +1,8 @@
 """PAR through the day: direct beam traced now, sky and scattered light from counted paths."""
 
-from dapple.formats import json, netcdf
+from dapple.formats import json, netcdf, tables
 from dapple.light import light_model, series, transport_files
-from dapple.scene import scene_files, scene_optics, sensors, traced
+from dapple.scene import scene_files, scene_optics, traced
 from dapple.streams import stream_seed
 from dapple.workflow import run
 
@@ -10,7 +10,7 @@ from dapple.workflow import run
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
     sky, optics = netcdf.read(inputs.sky), scene_optics.read(inputs.optics)
-    table = sensors.read_local(inputs.sensors)
+    table = tables.read(inputs.sensors)
     advised = json.read(inputs.model) if inputs.model else {"bands": len(optics)}
     model = light_model.Model(**advised)
     sky, optics = light_model.simplified(sky, optics, model)

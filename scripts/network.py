@@ -4,7 +4,7 @@ import time
 
 import pandas as pd
 
-from dapple.formats.atomic import atomic
+from dapple.formats import tables
 from dapple.retrieval import network, training_entries
 from dapple.retrieval.noise import Noise
 from dapple.workflow import run
@@ -12,7 +12,7 @@ from dapple.workflow import run
 
 def main(snakemake):
     params = snakemake.params
-    frame = pd.read_parquet(snakemake.input.training)
+    frame = tables.read(snakemake.input.training)
     parts = network.split(
         frame["combination"].to_numpy(), seed=params.split_seed, **dict(params.split)
     )
@@ -40,8 +40,7 @@ def main(snakemake):
         )
         network.write(path, net)
         histories.append(history.assign(seed=seed))
-    with atomic(snakemake.output.history) as partial:
-        pd.concat(histories).to_csv(partial, index=False, float_format="%.6g")
+    tables.write(snakemake.output.history, pd.concat(histories))
 
 
 if __name__ == "__main__":

@@ -3,8 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from dapple.formats import rasters
-from dapple.formats.atomic import atomic
+from dapple.formats import rasters, tables
 from dapple.retrieval import maps, training_entries
 from dapple.workflow import run
 
@@ -49,10 +48,7 @@ def main(snakemake):
         canopy[None].astype(np.float32), *corner, params.pixel_m, observed.crs, ("canopy",)
     )
     rasters.write(snakemake.output.canopy, mask)
-    with atomic(snakemake.output.pixels) as partial:
-        pixel_spectra(image, canopy, params.sunlit_nir).to_csv(
-            partial, index=False, float_format="%.6g"
-        )
+    tables.write(snakemake.output.pixels, pixel_spectra(image, canopy, params.sunlit_nir))
 
 
 def pixel_spectra(image, canopy, sunlit_nir):

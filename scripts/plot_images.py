@@ -4,9 +4,8 @@ import resource
 import time
 
 import numpy as np
-import pandas as pd
 
-from dapple.formats import json, meshes, rasters
+from dapple.formats import json, meshes, rasters, tables
 from dapple.formats.meshes import concatenate
 from dapple.formats.rasters import Raster
 from dapple.optics.bands import CAMERA_NM
@@ -20,7 +19,7 @@ def main(snakemake):
     settings, inputs = options(snakemake.params), snakemake.input
     begun, seed = time.perf_counter(), settings["seed"]
     origin_m = np.asarray(settings["origin_m"], float)
-    trees = pd.read_csv(inputs.trees)
+    trees = tables.read(inputs.trees)
     trees[["x_m", "y_m", "z_m"]] -= origin_m
     world, materials = assemble(inputs, trees, settings)
     scene = camera.build(world, materials)

@@ -3,9 +3,8 @@
 import time
 
 import numpy as np
-import pandas as pd
 
-from dapple.formats import clouds, json, meshes
+from dapple.formats import clouds, json, meshes, tables
 from dapple.formats.clouds import Cloud
 from dapple.virtual import plots, uav_scanner
 from dapple.workflow import options, run
@@ -14,7 +13,7 @@ from dapple.workflow import options, run
 def main(snakemake):
     settings, inputs = options(snakemake.params), snakemake.input
     begun = time.perf_counter()
-    trees = pd.read_csv(inputs.trees)
+    trees = tables.read(inputs.trees)
     origin_m = np.asarray(settings["origin_m"], float)
     trees[["x_m", "y_m", "z_m"]] -= origin_m
     world = {

@@ -3,8 +3,7 @@
 from dapple.cloud import ground
 from dapple.figures import crown_map as figure
 from dapple.figures import style
-from dapple.formats import clouds, json, meshes, rasters
-from dapple.formats.atomic import atomic
+from dapple.formats import clouds, json, meshes, rasters, tables
 from dapple.structure import crown_scene, facets
 from dapple.workflow import options, run
 
@@ -28,8 +27,7 @@ def main(snakemake):
     meshes.write_ply(output.leaves, scene.leaves, cloud.origin_m)
     meshes.write_ply(output.wood, scene.wood, cloud.origin_m)
     meshes.write_ply(output.terrain, terrain, cloud.origin_m)
-    with atomic(output.table) as partial:
-        scene.table.to_csv(partial, index=False, float_format="%.6g")
+    tables.write(output.table, scene.table)
     summary = {"world_origin_m": cloud.origin_m, "crs": dem.crs} | scene.facts
     json.write(output.summary, summary)
     plants = meshes.concatenate([scene.leaves, scene.wood])

@@ -3,8 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from dapple.formats import geojson, json, meshes
-from dapple.formats.atomic import atomic
+from dapple.formats import geojson, json, meshes, tables
 from dapple.streams import stream_seed
 from dapple.virtual import conifers, crown_outlines, plot_optics, plots, terrain
 from dapple.workflow import options, run
@@ -76,8 +75,7 @@ def write(trees, rings, settings, output):
     """Tables of the trees in world coordinates, and outlines of those that were sampled."""
     world = trees.copy()
     world[["x_m", "y_m", "z_m"]] += settings["origin_m"]
-    with atomic(output.trees) as partial:
-        world.to_csv(partial, index=False, float_format="%.10g")
+    tables.write(output.trees, world, "%.10g")
     chosen = np.flatnonzero(trees.sampled)
     crowns = geojson.of_rings(
         [rings[k] + np.asarray(settings["origin_m"][:2]) for k in chosen],

@@ -3,8 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from dapple.formats import json, netcdf
-from dapple.formats.atomic import atomic
+from dapple.formats import json, netcdf, tables
 from dapple.light.series import open_sky_par
 from dapple.stats import measured
 from dapple.stats.pairs import pair
@@ -43,8 +42,7 @@ def main(snakemake):
     if until := registration.get("fitting_until"):
         fitted |= table["time"] <= pd.Timestamp(until)
     table["part"] = np.where(fitted, "fitting", "reporting")
-    with atomic(snakemake.output.records) as partial:
-        table.to_csv(partial, index=False, float_format="%.3f")
+    tables.write(snakemake.output.records, table, "%.3f")
 
 
 if __name__ == "__main__":

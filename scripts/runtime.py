@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from dapple.formats.atomic import atomic
+from dapple.formats import tables
 from dapple.stats import runtime
 from dapple.workflow import run
 
@@ -10,8 +10,7 @@ from dapple.workflow import run
 def main(snakemake):
     folder = Path(snakemake.output.runtime).parent / "benchmarks"
     table = runtime.collect(sorted(folder.rglob("*.tsv")), folder, snakemake.params.reconstructions)
-    with atomic(snakemake.output.runtime) as partial:
-        table.to_csv(partial, index=False, float_format="%.2f")
+    tables.write(snakemake.output.runtime, table, "%.2f")
 
 
 if __name__ == "__main__":

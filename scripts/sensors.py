@@ -1,7 +1,6 @@
 """Sensors in the local frame, none of them outside the scene or inside a leaf."""
 
-from dapple.formats import json, meshes
-from dapple.formats.atomic import atomic
+from dapple.formats import json, meshes, tables
 from dapple.scene import sensors
 from dapple.workflow import run
 
@@ -25,8 +24,7 @@ def main(snakemake):
         geometry = {"leaf": meshes.read_ply(path), "wood": wood}
         where = str(inputs.table or "sensors")
         sensors.check(table, geometry, ground_z_m=params.ground_z_m, where=where)
-    with atomic(snakemake.output.sensors) as partial:
-        table.to_csv(partial, index=False)
+    tables.write(snakemake.output.sensors, table, None)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 import pandas as pd
 
 from dapple.figures import daily_courses, style
-from dapple.formats import netcdf
+from dapple.formats import netcdf, tables
 from dapple.stats import correlation
 from dapple.stats.pairs import simulated
 from dapple.workflow import run
@@ -12,14 +12,14 @@ from dapple.workflow import run
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
     if inputs.records:
-        records = pd.read_csv(inputs.records, parse_dates=["time"], dtype={"sensor": str})
+        records = tables.read(inputs.records)
         r = correlation.per_sensor(records)
     else:
-        tables = [
+        parts = [
             simulated(netcdf.read(path), name)
             for name, path in zip(params.reconstructions, inputs.light, strict=True)
         ]
-        records, r = pd.concat(tables, ignore_index=True), None
+        records, r = pd.concat(parts, ignore_index=True), None
     chosen = list(params.sensors)
     if not chosen and r is not None:
         chosen = daily_courses.choose_sensors(r, reconstruction=params.reconstructions[0])

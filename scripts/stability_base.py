@@ -1,8 +1,7 @@
 """Grow a world, scan it and run all methods undisturbed: what batches share."""
 
 from dapple import engine
-from dapple.formats import clouds, json, meshes, shots
-from dapple.formats.atomic import atomic
+from dapple.formats import clouds, json, meshes, shots, tables
 from dapple.stability import outcome
 from dapple.stability.chain import Chain
 from dapple.stability.stressors import UNDISTURBED, Level, Stressor
@@ -23,8 +22,7 @@ def main(snakemake):
     shots.write(outputs.shots, chain.shots(UNDISTURBED))
     clouds.write(outputs.cloud, chain.clean(UNDISTURBED))
     json.write(outputs.seconds, {step: chain.took_s(step) for step in ("tree", "shots", "clean")})
-    with atomic(outputs.undisturbed) as partial:
-        outcome.table(rows).to_csv(partial, index=False, float_format="%.6g")
+    tables.write(outputs.undisturbed, outcome.table(rows))
 
 
 if __name__ == "__main__":

@@ -3,8 +3,7 @@
 import pandas as pd
 
 from dapple import engine
-from dapple.formats import clouds, json, meshes, shots
-from dapple.formats.atomic import atomic
+from dapple.formats import clouds, json, meshes, shots, tables
 from dapple.stability import outcome, stressors
 from dapple.stability.chain import Chain
 from dapple.stability.stressors import UNDISTURBED
@@ -26,19 +25,18 @@ def main(snakemake):
     }
     for step, value in ready.items():
         chain.give(step, UNDISTURBED, value, seconds[step])
-    tables = []
+    parts = []
     for level in stressor.chosen(params.levels):
         if level.changes:
             rows = outcome.rows(chain, stressor, level, world, params.methods)
-            tables.append(outcome.table(rows))
+            parts.append(outcome.table(rows))
         else:
-            undisturbed = pd.read_csv(inputs.undisturbed, keep_default_na=True)
-            tables.append(
+            undisturbed = tables.read(inputs.undisturbed)
+            parts.append(
                 undisturbed.assign(stressor=stressor.name, level=level.value, label=level.label)
             )
         print(f"{stressor.name} {level.label}", flush=True)
-    with atomic(snakemake.output.batch) as partial:
-        pd.concat(tables, ignore_index=True).to_csv(partial, index=False, float_format="%.6g")
+    tables.write(snakemake.output.batch, pd.concat(parts, ignore_index=True))
 
 
 if __name__ == "__main__":

@@ -2,13 +2,10 @@
 
 import pandas as pd
 
-from dapple.formats.atomic import atomic
+from dapple.formats import tables
 from dapple.stability import thresholds
 from dapple.verdict import fitting, judgement
 from dapple.workflow import run
-
-TEXT = {"label": str, "failed": str}
-
 
 ENOUGH = 500
 """Rows from which a half of them can teach the verdict on the other."""
@@ -16,20 +13,17 @@ ENOUGH = 500
 
 def main(snakemake):
     outputs = snakemake.output
-    points = pd.concat(
-        [pd.read_csv(path, dtype=TEXT) for path in snakemake.input.batches], ignore_index=True
-    )
+    points = pd.concat([tables.read(path) for path in snakemake.input.batches], ignore_index=True)
     points = thresholds.against_harmless(points)
     for column, with_records in (("flagged", True), ("flagged_scan", False)):
         points[column] = judged(points, snakemake.input.model, with_records)
-    tables = {
+    found = {
         outputs.points: points,
         outputs.thresholds: thresholds.table(points),
         outputs.published: thresholds.published(points),
     }
-    for path, table in tables.items():
-        with atomic(path) as partial:
-            table.to_csv(partial, index=False, float_format="%.6g")
+    for path, table in found.items():
+        tables.write(path, table)
     print(f"{len(points)} runs, {points['r'].isna().sum()} of them without a result")
 
 

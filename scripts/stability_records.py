@@ -5,10 +5,9 @@ from pathlib import Path
 import pandas as pd
 
 from dapple import engine
-from dapple.formats import netcdf
-from dapple.formats.atomic import atomic
+from dapple.formats import netcdf, tables
 from dapple.light.moved_sensors import moved_light
-from dapple.scene import scene_files, sensors, traced
+from dapple.scene import scene_files, traced
 from dapple.stability import worse_records
 from dapple.stats.pairs import simulated
 from dapple.workflow import run
@@ -20,9 +19,8 @@ TOLERANCE, MAX_RAYS = 0.01, 1024
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
     engine.use_threads(snakemake.threads)
-    told = pd.read_csv(inputs.records, parse_dates=["time"], dtype={"sensor": str, "part": str})
+    told = tables.read(inputs.records)
     told = told[(told["part"] == "reporting") & told["reconstruction"].isin(params.methods)]
-    told["time"] = told["time"].astype("datetime64[ns, UTC]")
     lit = Lit(inputs, params, told["sensor"].unique())
 
     def moved(error_m, seed):
@@ -40,8 +38,7 @@ def main(snakemake):
         n_seeds=params.seeds,
         seed=params.seed,
     )
-    with atomic(snakemake.output.records) as partial:
-        found.to_csv(partial, index=False, float_format="%.6g")
+    tables.write(snakemake.output.records, found)
 
 
 class Lit:
@@ -52,7 +49,7 @@ class Lit:
         self.light = {
             Path(path).stem: netcdf.read(path).sel(sensor=reporting) for path in inputs.light
         }
-        table = sensors.read_local(inputs.sensors).set_index("sensor")
+        table = tables.read(inputs.sensors).set_index("sensor")
         self.places_m = table.loc[reporting, ["x_m", "y_m", "z_m"]].to_numpy()
         self.scenes = {}
         for name in params.methods:

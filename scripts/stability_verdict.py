@@ -2,13 +2,13 @@
 
 import pandas as pd
 
-from dapple.formats.atomic import atomic
+from dapple.formats import tables
 from dapple.verdict import judgement
 from dapple.workflow import run
 
 
 def main(snakemake):
-    points = pd.read_csv(snakemake.input.points, dtype={"label": str, "failed": str})
+    points = tables.read(snakemake.input.points)
     found = judgement.store(snakemake.output.model, points)
     rows = []
     for kind, facts in found.items():
@@ -17,8 +17,7 @@ def main(snakemake):
             rows += [{"signals": kind, "check": check, "of": of} | one for of, one in parts.items()]
     table = pd.DataFrame(rows)
     print(table[table["of"] == "all"].to_string())
-    with atomic(snakemake.output.rates) as partial:
-        table.to_csv(partial, index=False, float_format="%.4g")
+    tables.write(snakemake.output.rates, table, "%.4g")
 
 
 if __name__ == "__main__":

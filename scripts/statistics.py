@@ -1,19 +1,15 @@
 """How well simulated light matches measured light, on records that no fit has seen."""
 
-import pandas as pd
-
-from dapple.formats.atomic import atomic
+from dapple.formats import tables
 from dapple.stats import correlation
 from dapple.workflow import run
 
 
 def main(snakemake):
     params, output = snakemake.params, snakemake.output
-    records = pd.read_csv(
-        snakemake.input.records, parse_dates=["time"], dtype={"sensor": str, "part": str}
-    )
+    records = tables.read(snakemake.input.records)
     unseen = records[records["part"] == "reporting"]
-    tables = {
+    found = {
         output.overall: correlation.overall(
             unseen,
             seed=params.seed,
@@ -23,9 +19,8 @@ def main(snakemake):
         output.per_sensor: correlation.per_sensor(unseen),
         output.mixed_model: correlation.mixed_model(unseen),
     }
-    for path, table in tables.items():
-        with atomic(path) as partial:
-            table.to_csv(partial, index=False, float_format="%.6g")
+    for path, table in found.items():
+        tables.write(path, table)
 
 
 if __name__ == "__main__":

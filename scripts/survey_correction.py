@@ -3,9 +3,8 @@
 import numpy as np
 import pandas as pd
 
-from dapple.formats import voxel_grids
-from dapple.formats.atomic import atomic
-from dapple.survey import compare, correction, grid_files
+from dapple.formats import netcdf, tables, voxel_grids
+from dapple.survey import compare, correction
 from dapple.survey.voxel_status import attribute
 from dapple.virtual.stands import SPECIES
 from dapple.workflow import run
@@ -17,8 +16,8 @@ def main(snakemake):
     for (stand, seed, design), reach_path, cells_path in zip(
         params.runs, snakemake.input.reach, snakemake.input.cells, strict=True
     ):
-        truth = grid_files.read(snakemake.input.truth[params.truths.index((stand, seed))])
-        reach, density = grid_files.read(reach_path), voxel_grids.read(cells_path)
+        truth = netcdf.read(snakemake.input.truth[params.truths.index((stand, seed))])
+        reach, density = netcdf.read(reach_path), voxel_grids.read(cells_path)
         bit = int(np.argmax(reach.attrs["n_beams"]))
         cells[stand, seed, design] = correction.cells_of(
             attribute(reach.hit.values, reach.passed.values, bit),
@@ -33,16 +32,15 @@ def main(snakemake):
             density, truth, params.per_edge, params.range_m, params.neighbours
         )
         estimates += [{"stand": stand, "design": design, "seed": seed} | row for row in found]
-    tables = {
+    results = {
         "regression": compare.regression_table(cells),
         "factors": compare.factor_table(cells),
         "profile": compare.profile_table(cells, params.cell_size_m),
         "correction": compare.correction_table(cells),
         "estimators": pd.DataFrame(estimates),
     }
-    for name, table in tables.items():
-        with atomic(snakemake.output[name]) as partial:
-            table.to_csv(partial, index=False, float_format="%.6g")
+    for name, table in results.items():
+        tables.write(snakemake.output[name], table)
 
 
 if __name__ == "__main__":

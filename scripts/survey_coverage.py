@@ -2,8 +2,7 @@
 
 import pandas as pd
 
-from dapple.formats import json, shots
-from dapple.formats.atomic import atomic
+from dapple.formats import json, shots, tables
 from dapple.survey import coverage
 from dapple.workflow import options, run
 
@@ -11,8 +10,7 @@ from dapple.workflow import options, run
 def main(snakemake):
     path = snakemake.input.shots
     classes, summary = coverage.of_shots(lambda: shots.iterate(path), **options(snakemake.params))
-    with atomic(snakemake.output.classes) as partial:
-        pd.DataFrame(classes).to_csv(partial, index=False, float_format="%.6g")
+    tables.write(snakemake.output.classes, pd.DataFrame(classes))
     json.write(snakemake.output.summary, summary)
 
 

@@ -4,8 +4,7 @@ import numpy as np
 import pandas as pd
 
 from dapple.cloud import ground
-from dapple.formats import clouds, shots, voxel_grids
-from dapple.formats.atomic import atomic
+from dapple.formats import clouds, shots, tables, voxel_grids
 from dapple.survey import airborne, fill, plan
 from dapple.workflow import run
 
@@ -63,8 +62,7 @@ def main(snakemake):
     table.insert(0, "scan", np.arange(1, n + 1))
     table["scanned"] = np.arange(n) < len(taken)
     table["expected_rs"] = expected
-    with atomic(snakemake.output.next) as partial:
-        table.to_csv(partial, index=False, float_format="%.6g")
+    tables.write(snakemake.output.next, table)
 
 
 if __name__ == "__main__":

@@ -3,10 +3,9 @@
 import numpy as np
 import pandas as pd
 
-from dapple.formats import voxel_grids
-from dapple.formats.atomic import atomic
+from dapple.formats import netcdf, tables, voxel_grids
 from dapple.streams import stream_seed
-from dapple.survey import fill, grid_files, plan
+from dapple.survey import fill, plan
 from dapple.workflow import run
 
 N_RANDOM = 50
@@ -19,7 +18,7 @@ def main(snakemake):
     for (stand, seed), truth_path, seen_path, cells_path in zip(
         params.truths, inputs.truth, inputs.candidates, inputs.cells, strict=True
     ):
-        truth, scans = grid_files.read(truth_path), grid_files.read(seen_path)
+        truth, scans = netcdf.read(truth_path), netcdf.read(seen_path)
         first = voxel_grids.read(cells_path)
         filled = (truth.leaf_area_m2 + truth.wood_area_m2).values > 0
         seen = scans.seen.values[filled].astype(np.uint32)
@@ -62,8 +61,7 @@ def main(snakemake):
             places.append({"stand": stand, "seed": seed, "scan": k + 1,
                            "x_m": x_m, "y_m": y_m, "z_m": z_m})  # fmt: skip
     for path, table in ((snakemake.output.plan, rows), (snakemake.output.positions, places)):
-        with atomic(path) as partial:
-            pd.DataFrame(table).to_csv(partial, index=False, float_format="%.6g")
+        tables.write(path, pd.DataFrame(table))
 
 
 if __name__ == "__main__":

@@ -3,8 +3,9 @@
 import numpy as np
 import pandas as pd
 
+from dapple.formats import netcdf, tables
 from dapple.formats.atomic import atomic
-from dapple.survey import grid_files, shadow
+from dapple.survey import shadow
 from dapple.survey.voxel_status import attribute
 from dapple.workflow import run
 
@@ -16,9 +17,9 @@ def main(snakemake):
     for (stand, seed, design), path in zip(params.runs, snakemake.input.reach, strict=True):
         if (stand, seed) not in truths:
             at = params.truths.index((stand, seed))
-            truth = grid_files.read(snakemake.input.truth[at])
+            truth = netcdf.read(snakemake.input.truth[at])
             truths = {(stand, seed): (truth.leaf_area_m2 + truth.wood_area_m2).values > 0}
-        filled, reach = truths[stand, seed], grid_files.read(path)
+        filled, reach = truths[stand, seed], netcdf.read(path)
         n_beams = np.atleast_1d(reach.attrs["n_beams"])
         for bit, n in enumerate(n_beams):
             found = attribute(reach.hit.values, reach.passed.values, bit)
@@ -44,8 +45,7 @@ def main(snakemake):
         ["stand", "design", "n_beams", "seed", "height_m", "true", "hit", "reached"]
     ]
     for path, frame in ((snakemake.output.shadowing, table), (snakemake.output.profile, profile)):
-        with atomic(path) as partial:
-            frame.to_csv(partial, index=False, float_format="%.6g")
+        tables.write(path, frame)
     with atomic(snakemake.output.maps) as partial:
         np.savez_compressed(partial, **maps)
 

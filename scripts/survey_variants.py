@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pandas as pd
 
-from dapple.formats.atomic import atomic
+from dapple.formats import tables
 from dapple.streams import stream_seed
 from dapple.survey import correction, designs, hemisphere, shadow
 from dapple.survey.voxel_status import Reach, attribute
@@ -45,8 +45,7 @@ def main(snakemake):
                 {"stand": species, "variant": name} | row
                 for row in scanned(stand, settings, beam, any_face)
             ]
-    with atomic(snakemake.output.variants) as partial:
-        pd.DataFrame(rows).to_csv(partial, index=False, float_format="%.6g")
+    tables.write(snakemake.output.variants, pd.DataFrame(rows))
 
 
 def scanned(stand, settings, beam, any_face):

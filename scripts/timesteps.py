@@ -1,8 +1,8 @@
 """Light at the sensors by Mitsuba's own integrators, one cached file a timestep."""
 
-from dapple.formats import netcdf
+from dapple.formats import netcdf, tables
 from dapple.light.timestep_series import Reference, run_all
-from dapple.scene import scene_files, scene_optics, sensors
+from dapple.scene import scene_files, scene_optics
 from dapple.workflow import run
 
 
@@ -17,7 +17,7 @@ def main(snakemake):
     )
     computed = run_all(
         reference,
-        sensors.read_local(inputs.sensors),
+        tables.read(inputs.sensors),
         snakemake.output.times,
         [*inputs.leaves, inputs.wood],
     )

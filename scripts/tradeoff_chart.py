@@ -1,14 +1,13 @@
 """Accuracy against speed: the chart of the trade-off as PNG and as HTML."""
 
-import pandas as pd
-
 from dapple.figures import pareto_chart, style
+from dapple.formats import tables
 from dapple.formats.atomic import atomic
 from dapple.workflow import run
 
 
 def main(snakemake):
-    points = pd.read_csv(snakemake.input.points)
+    points = tables.read(snakemake.input.points)
     style.save(pareto_chart.draw(points), snakemake.output.chart)
     title = f"{snakemake.params.experiment}: accuracy against speed"
     with atomic(snakemake.output.page) as partial:

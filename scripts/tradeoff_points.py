@@ -7,12 +7,11 @@ from itertools import product
 import numpy as np
 
 from dapple.advice import tradeoff
-from dapple.formats import netcdf, voxel_grids
-from dapple.formats.atomic import atomic
+from dapple.formats import netcdf, tables, voxel_grids
 from dapple.light import light_model, series
 from dapple.light.light_model import Cost, Effort, Model, timed
 from dapple.light.timestep_series import Reference
-from dapple.scene import scene_files, scene_optics, sensors, traced
+from dapple.scene import scene_files, scene_optics, traced
 from dapple.scene.surfaces import Scene
 from dapple.workflow import run
 
@@ -26,7 +25,7 @@ class Grid:
 
     def __init__(self, params, inputs):
         sky, self.optics = netcdf.read(inputs.sky), scene_optics.read(inputs.optics)
-        table = sensors.read_local(inputs.sensors)
+        table = tables.read(inputs.sensors)
         lit = np.flatnonzero(series.open_sky_par(sky).to_numpy() > 0)
         self.sky = sky.isel(time=lit[light_model.spread(len(lit), params.times)])
         self.table = table.iloc[light_model.spread(len(table), params.sensors)]
@@ -191,8 +190,7 @@ def main(snakemake):
             references.append((name, size_m, scene, finest))
     for name, size_m, scene, finest in references:
         rows += timestep_points(grid, name, size_m, scene, finest)
-    with atomic(snakemake.output.points) as partial_path:
-        tradeoff.table(rows).to_csv(partial_path, index=False, float_format="%.6g")
+    tables.write(snakemake.output.points, tradeoff.table(rows))
 
 
 if __name__ == "__main__":

@@ -5,8 +5,7 @@ import time
 import numpy as np
 
 from dapple.errors import InputError
-from dapple.formats import json, meshes, rasters
-from dapple.formats.atomic import atomic
+from dapple.formats import json, meshes, rasters, tables
 from dapple.retrieval import coefficient_files as coefficient_files
 from dapple.retrieval import coefficients, prosail, semiless, spectra, training_entries
 from dapple.workflow import options, run
@@ -43,8 +42,7 @@ def main(snakemake):
         )  # fmt: skip
         n_made = int(np.isfinite(means[:, 0]).sum())
         print(f"{name}: {n_made} entries of {len(leaves)} combinations, {len(frame)} kept")
-        with atomic(path) as partial:
-            frame.to_parquet(partial, index=False)
+        tables.write(path, frame)
     print(f"{time.perf_counter() - start:.1f} s")
 
 

@@ -1,16 +1,16 @@
 """Trace paths from the sensors once, for any sky, spectrum and time."""
 
-from dapple.formats import json
+from dapple.formats import json, tables
 from dapple.light import series, transport
 from dapple.light import transport_files as files
-from dapple.scene import scene_files, scene_optics, sensors, traced
+from dapple.scene import scene_files, scene_optics, traced
 from dapple.workflow import run
 
 
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
     scene = scene_files.read([inputs.leaves], inputs.wood, params.ground_z_m)[0]
-    table = sensors.read_local(inputs.sensors)
+    table = tables.read(inputs.sensors)
     advised = json.read(inputs.model) if inputs.model else {}
     print(f"variant {params.variant}, {len(table)} sensors")
     counted = transport.collect(

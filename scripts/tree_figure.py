@@ -1,15 +1,14 @@
 """The reconstructed tree from the side and from above, with the sensors."""
 
-import pandas as pd
-
 from dapple.figures import style, tree
+from dapple.formats import tables
 from dapple.scene import scene_files
 from dapple.workflow import run
 
 
 def main(snakemake):
     scene = scene_files.read([snakemake.input.leaves], snakemake.input.wood)[0]
-    sensors = pd.read_csv(snakemake.input.sensors)
+    sensors = tables.read(snakemake.input.sensors)
     style.save(tree.draw(scene, sensors=sensors), snakemake.output.figure)
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from dapple.formats import clouds, json, meshes, netcdf, shots, voxel_grids
+from dapple.formats import clouds, json, meshes, netcdf, shots, tables, voxel_grids
 from dapple.formats.clouds import LEAF
 from dapple.light.moved_sensors import moved_light
-from dapple.scene import scene_files, sensors, traced
+from dapple.scene import scene_files, traced
 from dapple.structure.subvoxel_clumping import as_estimated
 from dapple.verdict import judgement, signals
 from dapple.verdict.inputs import Evidence, count_points, no_mesh
@@ -58,7 +58,7 @@ def _lit(inputs, params):
     sky = netcdf.read(inputs.sky)
     at = np.unique(np.linspace(0, sky.sizes["time"] - 1, TIMES).round().astype(int))
     sky = sky.isel(time=at)
-    places = sensors.read_local(inputs.sensors)[["x_m", "y_m", "z_m"]].to_numpy()
+    places = tables.read(inputs.sensors)[["x_m", "y_m", "z_m"]].to_numpy()
     lit, moved = {}, {}
     for path in inputs.light:
         name = Path(path).stem
@@ -87,7 +87,7 @@ def _lit(inputs, params):
 
 def _records(path) -> xr.DataArray:
     """Measured PAR by sensor and time."""
-    table = pd.read_csv(path, dtype={"sensor": str})
+    table = tables.read(path)
     table = table[table["reconstruction"] == table["reconstruction"].iloc[0]]
     wide = table.pivot(index="sensor", columns="time", values="measured")
     when = pd.to_datetime(wide.columns, utc=True).tz_localize(None).to_numpy()

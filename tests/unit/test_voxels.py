@@ -431,7 +431,7 @@ def test_damaged_voxel_files_are_refused(tmp_path, dataset):
         files.read(path)
     files.write(path, dataset)
     path.write_bytes(path.read_bytes()[:2000])
-    with pytest.raises(InputError, match="no readable NetCDF"):
+    with pytest.raises(InputError, match="unreadable"):
         files.read(path)
     files.write(path, dataset.drop_vars("plant_area_density_m2_m3"))
     with pytest.raises(InputError, match="found variables"):

@@ -1,5 +1,6 @@
 """NetCDF datasets with units and names on every variable, and times that say their zone."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -55,25 +56,50 @@ def write(path: str | Path, dataset: xr.Dataset) -> None:
     ]
     if bare:
         raise ValueError(f"{path}: no units or long_name on {', '.join(bare)}")
-    encoding = {"time": TIME_ENCODING} if "time" in dataset.coords else {}
+    store(path, dataset, {"time": TIME_ENCODING} if "time" in dataset.coords else {})
+
+
+def store(path: str | Path, dataset: xr.Dataset, encoding: dict[str, dict]) -> None:
+    """Write NetCDF-4 with an encoding of each variable, whole or not at all.
+
+    The same dataset gives the same bytes.
+    """
     with atomic(path) as partial:
         dataset.to_netcdf(partial, engine="netcdf4", encoding=encoding)
 
 
-def read(path: str | Path) -> xr.Dataset:
+def read(
+    path: str | Path, variables: Sequence[str] = (), attributes: Sequence[str] = ()
+) -> xr.Dataset:
     """Read a dataset into memory.
+
+    Parameters
+    ----------
+    path : path
+    variables, attributes : sequence of str
+        What the file has to hold.
 
     Raises
     ------
     InputError
-        No such file, or not NetCDF.
+        No such file, not NetCDF, or one of another kind.
     """
     path = Path(path)
     if not path.is_file():
         raise InputError(path, "no file", "a NetCDF file", "Run the step that makes it.")
     try:
-        return xr.load_dataset(path, engine="netcdf4")
-    except (OSError, ValueError) as error:
+        dataset = xr.load_dataset(path, engine="netcdf4")
+    except (OSError, RuntimeError, ValueError) as error:
         raise InputError(
             path, f"an unreadable file ({error})", "a NetCDF file", "Delete it and run again."
         ) from error
+    missing = [name for name in variables if name not in dataset.variables]
+    missing += [name for name in attributes if name not in dataset.attrs]
+    if missing:
+        raise InputError(
+            path,
+            f"no {', '.join(missing)}",
+            f"a file with {', '.join([*variables, *attributes])}",
+            "Delete it and run again; it may come from another version.",
+        )
+    return dataset

@@ -7,6 +7,7 @@ import pandas as pd
 import xarray as xr
 
 from dapple.errors import InputError
+from dapple.formats import netcdf
 from dapple.formats.atomic import atomic
 
 _EXPECTED = "voxels with `plant_area_density_m2_m3` (x, y, z) and the attribute `voxel_size_m`"
@@ -33,8 +34,7 @@ def write(path: str | Path, dataset: xr.Dataset) -> None:
         encoding[name] = {"zlib": True, "complevel": 2, "shuffle": True}
         if values.dtype.kind == "f":
             encoding[name] |= {"dtype": "float32", "_FillValue": np.float32("nan")}
-    with atomic(path) as partial:
-        dataset.to_netcdf(partial, engine="netcdf4", encoding=encoding)
+    netcdf.store(path, dataset, encoding)
 
 
 def read(path: str | Path) -> xr.Dataset:
@@ -45,14 +45,7 @@ def read(path: str | Path) -> xr.Dataset:
     InputError
         The file is missing, cannot be read, or is no voxel grid.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(path, "no file", _EXPECTED, "Check the path.")
-    try:
-        with xr.open_dataset(path, engine="netcdf4") as opened:
-            dataset = opened.load()
-    except (OSError, RuntimeError, ValueError) as error:
-        raise InputError(path, f"no readable NetCDF ({error})", _EXPECTED, _REMEDY) from error
+    dataset = netcdf.read(path)
     pad = dataset.get("plant_area_density_m2_m3")
     if pad is None or set(pad.dims) != {"x", "y", "z"} or "voxel_size_m" not in dataset.attrs:
         raise InputError(path, f"variables {', '.join(dataset.data_vars)}", _EXPECTED, _REMEDY)

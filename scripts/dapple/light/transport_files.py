@@ -4,9 +4,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from dapple.errors import InputError
-from dapple.formats.atomic import atomic
-from dapple.formats.netcdf import read as read_netcdf
+from dapple.formats import netcdf
 from dapple.light.tensor import Transport
 
 ROWS = {
@@ -39,7 +37,9 @@ def write(path: str | Path, transport: Transport) -> None:
     }
     about = {"units": "1", "long_name": SKY}
     variables["sky_seen"] = (("start", "set", "sky_patch"), transport.sky_seen, about)
-    _write(path, xr.Dataset(variables, attrs={"max_orders": transport.max_orders}))
+    dataset = xr.Dataset(variables, attrs={"max_orders": transport.max_orders})
+    compressed = {"zlib": True, "complevel": 1, "shuffle": True}
+    netcdf.store(path, dataset, dict.fromkeys(variables, compressed))
 
 
 def read(path: str | Path) -> Transport:
@@ -51,26 +51,6 @@ def read(path: str | Path) -> Transport:
         No such file, or one of another kind.
     """
     names = [*ROWS, *SENSORS, "sky_seen"]
-    dataset = _read(path, names, ("max_orders",))
+    dataset = netcdf.read(path, names, ("max_orders",))
     columns = {name: dataset[name].to_numpy() for name in names}
     return Transport(**columns, max_orders=int(dataset.attrs["max_orders"]))
-
-
-def _write(path: str | Path, dataset: xr.Dataset) -> None:
-    encoding = {name: {"zlib": True, "complevel": 1, "shuffle": True} for name in dataset.data_vars}
-    with atomic(path) as partial:
-        dataset.to_netcdf(partial, engine="netcdf4", encoding=encoding)
-
-
-def _read(path: str | Path, variables: list[str], attributes: tuple[str, ...]) -> xr.Dataset:
-    dataset = read_netcdf(path)
-    missing = [name for name in variables if name not in dataset.variables]
-    missing += [name for name in attributes if name not in dataset.attrs]
-    if missing:
-        raise InputError(
-            path,
-            f"no {', '.join(missing)}",
-            f"a file with {', '.join([*variables, *attributes])}",
-            "Delete it and run again; it may come from another version.",
-        )
-    return dataset

@@ -5,9 +5,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from dapple.errors import InputError
-from dapple.formats.atomic import atomic
-from dapple.formats.netcdf import read as read_netcdf
+from dapple.formats import netcdf
 from dapple.retrieval.coefficients import Coefficients, Window
 from dapple.retrieval.semiless import Fitted
 
@@ -41,7 +39,7 @@ def read(path: str | Path) -> Coefficients:
     InputError
         No such file, or one of another kind.
     """
-    dataset = _read(path, [*TABLES], NUMBERS)
+    dataset = netcdf.read(path, [*TABLES], [*NUMBERS, *WINDOW])
     numbers = {name: dataset.attrs[name].item() for name in NUMBERS}
     tables = {name: dataset[name].to_numpy() for name in TABLES}
     return Coefficients(window=_window(dataset), **tables, **numbers)
@@ -66,7 +64,7 @@ def write_semiless(path: str | Path, fitted: Fitted) -> None:
 
 def read_semiless(path: str | Path) -> Fitted:
     """Read what `write_semiless` wrote; raises as `read`."""
-    dataset = _read(path, ["terms", "diffuse_share"], ())
+    dataset = netcdf.read(path, ["terms", "diffuse_share"], WINDOW)
     return Fitted(
         _window(dataset), dataset["terms"].to_numpy(), dataset["diffuse_share"].to_numpy()
     )
@@ -80,22 +78,7 @@ def _write(path: str | Path, variables: dict, window: Window, attributes: dict) 
         sizes = zip(variable.dims, variable.shape, strict=True)
         chunks = [min(n, CHUNK_PIXELS) if dim == "pixel" else n for dim, n in sizes]
         encoding[name] = {"zlib": True, "complevel": 1, "shuffle": True, "chunksizes": chunks}
-    with atomic(path) as partial:
-        dataset.to_netcdf(partial, engine="netcdf4", encoding=encoding)
-
-
-def _read(path: str | Path, variables: list[str], numbers: tuple[str, ...]) -> xr.Dataset:
-    dataset = read_netcdf(path)
-    missing = [name for name in variables if name not in dataset.variables]
-    missing += [name for name in (*numbers, *WINDOW) if name not in dataset.attrs]
-    if missing:
-        raise InputError(
-            path,
-            f"no {', '.join(missing)}",
-            f"a file with {', '.join([*variables, *numbers, *WINDOW])}",
-            "Delete it and run again; it may come from another version.",
-        )
-    return dataset
+    netcdf.store(path, dataset, encoding)
 
 
 def _window(dataset: xr.Dataset) -> Window:

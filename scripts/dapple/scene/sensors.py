@@ -253,11 +253,6 @@ def _text(point: np.ndarray) -> str:
     return "(" + ", ".join(f"{value:.2f}" for value in point) + ") m"
 
 
-def read_local(path: str | Path) -> pd.DataFrame:
-    """Read a sensor table that is in the local frame already, as the workflow writes it."""
-    return pd.read_csv(path, dtype={"sensor": str})
-
-
 def stem_position(wood: Mesh, height_m: float = 1.0) -> np.ndarray:
     """Where the stem stands: the area-weighted middle of the lowest wood.
 

@@ -5,8 +5,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from dapple.errors import InputError
-from dapple.formats.atomic import atomic
+from dapple.formats import netcdf
 
 
 def write(path: str | Path, grids: dict[str, np.ndarray], **attributes) -> None:
@@ -18,22 +17,4 @@ def write(path: str | Path, grids: dict[str, np.ndarray], **attributes) -> None:
     for name, values in grids.items():
         if values.dtype.kind == "f":
             encoding[name]["dtype"] = "float32"
-    with atomic(path) as partial:
-        dataset.to_netcdf(partial, engine="netcdf4", encoding=encoding)
-
-
-def read(path: str | Path) -> xr.Dataset:
-    """Read grids into memory.
-
-    Raises
-    ------
-    InputError
-        The file is missing or no readable NetCDF.
-    """
-    try:
-        with xr.open_dataset(Path(path), engine="netcdf4") as opened:
-            return opened.load()
-    except (OSError, RuntimeError, ValueError) as error:
-        raise InputError(
-            path, f"no readable grids ({error})", "NetCDF of a survey", "Make it again."
-        ) from error
+    netcdf.store(path, dataset, encoding)
