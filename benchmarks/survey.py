@@ -17,8 +17,11 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
 from dapple.survey import designs, hemisphere
+from dapple.survey.hemisphere_scanner import Hemisphere
 from dapple.survey.voxel_status import Reach
 from dapple.virtual import stands
+from dapple.virtual.box_grids import grid_shape
+from dapple.virtual.stand_species import SPECIES
 
 SPACING_M = 7.5
 
@@ -34,7 +37,7 @@ def square(species: str, edge_m: float, leaf_area_index: float = 4.5) -> stands.
 def fire(stand: stands.Stand, n_beams: float, reach: Reach | None) -> tuple[int, float]:
     """Beams of one scan in the middle of a stand, and the seconds that they take."""
     step_deg = 360 * 360 / n_beams  # 0.25 degrees of zenith are 360 rows
-    scanner = hemisphere.Hemisphere(azimuth_steps_deg=(step_deg,))
+    scanner = Hemisphere(azimuth_steps_deg=(step_deg,))
     (place_m,) = designs.positions("single", stand.size_m, 1.3)
     world = hemisphere.world_of(stand)
     beams = hemisphere.scan(world, stand, place_m, scanner, 1, seed=1)
@@ -58,9 +61,9 @@ def main() -> None:
     parser.add_argument("--beams", type=float, default=1e6)
     parser.add_argument("--edge", type=float, default=100.0, help="of the large stand, m")
     options = parser.parse_args()
-    for species in stands.SPECIES:
+    for species in SPECIES:
         stand = square(species, 15.0)
-        shape = stands.grid_shape(stand.size_m, 0.1)
+        shape = grid_shape(stand.size_m, 0.1)
         for what, reach in (("scanned", None), ("and followed", Reach.empty(shape, 0.1))):
             count, seconds = fire(stand, options.beams, reach)
             print(f"{species}, {what}: {count / seconds / 1e3:.0f} thousand beams per second")

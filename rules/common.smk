@@ -13,18 +13,20 @@ HOME = Path(str(workflow.current_basedir)).parent
 SCRIPTS = HOME / "scripts"
 sys.path.append(str(SCRIPTS))
 
+from dapple.clock import label, time_range
 from dapple.config.settings import validate
 from dapple.errors import InputError
-from dapple.times import label, time_range
 from dapple.streams import stream_seed
 from dapple.workflow import code_of, short
 
 try:
-    settings = validate(config, " + ".join(str(file) for file in workflow.configfiles))
-    TIMES = [label(time) for time in time_range(**dict(settings.time))]
+    settings = validate(
+        config, " + ".join(short(Path(file)) for file in workflow.configfiles)
+    )
 except InputError as error:
     sys.exit(f"dapple: {error}")
 
+TIMES = [label(time) for time in time_range(**dict(settings.time))]
 PLACEMENTS = range(settings.leaves.placements if settings.source == "wood" else 1)
 VOXELS = [name for name in settings.reconstructions if name.startswith("voxels_")]
 LIT = settings.reconstructions if settings.sensors.kind != "none" else ()

@@ -7,12 +7,12 @@ import numpy as np
 import yaml
 
 from dapple.advice import cheapest, refinements
+from dapple.clock import label
 from dapple.formats import json, netcdf, tables, voxel_grids
 from dapple.formats.atomic import atomic
 from dapple.light import light_model, series
 from dapple.scene import scene_files, scene_optics, traced
 from dapple.scene.surfaces import Scene
-from dapple.times import label
 from dapple.workflow import run
 
 

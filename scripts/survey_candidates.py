@@ -6,20 +6,22 @@ import numpy as np
 
 from dapple.streams import stream_seed
 from dapple.survey import designs, grid_files, hemisphere
+from dapple.survey.hemisphere_scanner import Hemisphere
 from dapple.survey.voxel_status import Reach
 from dapple.virtual import stands
+from dapple.virtual.box_grids import grid_shape
 from dapple.workflow import options, run
 
 
 def main(snakemake):
     settings = options(snakemake.params)
     stand = stands.grow(snakemake.wildcards.stand, **settings["stand"])
-    scanner = hemisphere.Hemisphere(**settings["scanner"])
+    scanner = Hemisphere(**settings["scanner"])
     scanner = dataclasses.replace(scanner, azimuth_steps_deg=(max(scanner.azimuth_steps_deg),))
     world = hemisphere.world_of(stand)
     places_m = designs.candidates(stand.size_m, settings["height_m"], settings["along"])
     places_m = [place for place in places_m if not hemisphere.is_inside_wood(world, place)]
-    shape = stands.grid_shape(stand.size_m, settings["voxel_size_m"])
+    shape = grid_shape(stand.size_m, settings["voxel_size_m"])
     reach = Reach.empty(shape, settings["voxel_size_m"], dtype=np.uint32)
     for number, place_m in enumerate(places_m):
         seed = stream_seed(settings["seed"], "candidate", number)

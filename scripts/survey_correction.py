@@ -6,7 +6,7 @@ import pandas as pd
 from dapple.formats import netcdf, tables, voxel_grids
 from dapple.survey import compare, correction
 from dapple.survey.voxel_status import attribute
-from dapple.virtual.stands import SPECIES
+from dapple.virtual.stand_species import SPECIES
 from dapple.workflow import run
 
 

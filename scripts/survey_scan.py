@@ -6,22 +6,24 @@ from dapple.formats import voxel_grids
 from dapple.streams import stream_seed
 from dapple.structure.voxels import Grid, plant_area_density
 from dapple.survey import designs, grid_files, hemisphere
+from dapple.survey.hemisphere_scanner import Hemisphere
 from dapple.survey.voxel_status import Reach
 from dapple.virtual import stands
+from dapple.virtual.box_grids import grid_shape
 from dapple.workflow import options, run
 
 
 def main(snakemake):
     settings = options(snakemake.params)
     stand = stands.grow(snakemake.wildcards.stand, **settings["stand"])
-    scanner = hemisphere.Hemisphere(**settings["scanner"])
+    scanner = Hemisphere(**settings["scanner"])
     positions_m = designs.positions(
         snakemake.wildcards.design, stand.size_m, settings["height_m"], settings["positions_m"]
     )
-    shape = stands.grid_shape(stand.size_m, settings["voxel_size_m"])
+    shape = grid_shape(stand.size_m, settings["voxel_size_m"])
     cells = Grid(
         (0.0, 0.0, 0.0),
-        stands.grid_shape(stand.size_m, settings["cell_size_m"]),
+        grid_shape(stand.size_m, settings["cell_size_m"]),
         settings["cell_size_m"],
     )
     reach = Reach.empty(shape, settings["voxel_size_m"])

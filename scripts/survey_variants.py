@@ -8,8 +8,11 @@ import pandas as pd
 from dapple.formats import tables
 from dapple.streams import stream_seed
 from dapple.survey import correction, designs, hemisphere, shadow
+from dapple.survey.hemisphere_scanner import Hemisphere
 from dapple.survey.voxel_status import Reach, attribute
 from dapple.virtual import stands
+from dapple.virtual.box_grids import voxels_per_cell
+from dapple.virtual.stand_species import SPECIES
 from dapple.workflow import options, run
 
 LARGE = {"leaf_length_min_m": 0.14, "leaf_length_max_m": 0.22}
@@ -38,7 +41,7 @@ def main(snakemake):
     rows = []
     for species, stand_settings in settings["stands"].items():
         for name, (tree, beam, any_face) in VARIANTS.items():
-            if tree and tree.items() <= stands.SPECIES[species].items():
+            if tree and tree.items() <= SPECIES[species].items():
                 continue  # that is what the species is like
             stand = stands.grow(species, **stand_settings, **tree)
             rows += [
@@ -51,9 +54,9 @@ def main(snakemake):
 def scanned(stand, settings, beam, any_face):
     """Shadow, and regression of well covered cells, of the designs with one and five scans."""
     size_m = settings["voxel_size_m"]
-    scanner = dataclasses.replace(hemisphere.Hemisphere(**settings["scanner"]), **beam)
+    scanner = dataclasses.replace(Hemisphere(**settings["scanner"]), **beam)
     filled = sum(stands.area_in_voxels(stand, part, size_m) for part in ("leaves", "wood")) > 0
-    per_edge = shadow.voxels_per_cell(settings["cell_size_m"], size_m)
+    per_edge = voxels_per_cell(settings["cell_size_m"], size_m)
     truth = shadow.in_cells(filled, per_edge)
     world = hemisphere.world_of(stand)
     for design in ("single", "diamond"):

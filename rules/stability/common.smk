@@ -5,6 +5,8 @@ Needs   the configuration
 Makes   nothing
 """
 
+from dapple.stability.stressors import STRESSORS
+
 STABILITY = settings.stability
 STABILITY_WORLDS = range(1, STABILITY.seeds + 1)
 STABILITY_BASE = (
@@ -19,19 +21,7 @@ STABILITY_LARGE = {"angular_step": 5000, "leaf_size": 5000}
 
 WORSENED = [name for name in COMPARED if name != "truth"]
 
-if settings.study == "stability":
-    from dapple.light.series import DIRECT_SHARE
-    from dapple.stability import stressors as dapple_stressors
-
-    try:
-        STABILITY_STRESSORS = [
-            dapple_stressors.find(name).name
-            for name in STABILITY.stressors or dapple_stressors.STRESSORS
-        ]
-    except InputError as error:
-        sys.exit(f"dapple: {error}")
-else:
-    STABILITY_STRESSORS, DIRECT_SHARE = [], 1.0
+STABILITY_STRESSORS = STABILITY.stressors or tuple(STRESSORS)
 
 
 def stability_setup():
@@ -62,7 +52,7 @@ def stability_setup():
             "max_orders": transport.max_orders,
             "max_shadow_rays": transport.max_shadow_rays,
             "sun_kernel_deg": transport.sun_kernel_deg,
-            "shadow_tolerance": DIRECT_SHARE * transport.tolerance,
+            "tolerance": transport.tolerance,
             "bands": STABILITY.bands,
             "truth_factor": STABILITY.truth_factor,
         },

@@ -9,20 +9,6 @@ SURVEY = settings.survey
 REPLICATES = range(1, SURVEY.replicates + 1)
 STANDS = [(stand, replicate) for stand in SURVEY.stands for replicate in REPLICATES]
 SCANS = [(*stand, design) for stand in STANDS for design in SURVEY.designs]
-SCANNER = {
-    key: getattr(SURVEY, key)
-    for key in (
-        "zenith_step_deg",
-        "azimuth_steps_deg",
-        "beam_divergence_mrad",
-        "exit_aperture_m",
-        "sub_rays",
-        "reflectance",
-        "min_energy",
-        "pulse_m",
-        "max_returns",
-    )
-}
 
 PLANNED_FROM = (
     {"canopy": data(SURVEY.canopy)}
@@ -32,25 +18,6 @@ PLANNED_FROM = (
         "shots": results("scan/shots.parquet"),
     }
 )
-
-if settings.study == "survey":
-    from dapple.survey.checks import check
-
-    try:
-        check(
-            stands=SURVEY.stands,
-            leaf_area_index=SURVEY.leaf_area_index,
-            volume_m=SURVEY.volume_m,
-            voxel_size_m=SURVEY.voxel_size_m,
-            cell_size_m=SURVEY.cell_size_m,
-            design_names=SURVEY.designs,
-            positions_m=SURVEY.positions_m,
-            height_m=SURVEY.height_m,
-            density_step_deg=SURVEY.density_step_deg,
-            scanner=SCANNER,
-        )
-    except InputError as error:
-        sys.exit(f"dapple: {error}")
 
 
 def grown(stand, replicate):

@@ -61,7 +61,7 @@ rule survey_scan:
         mem_mb=3000,
     params:
         stand=stand_settings,
-        scanner=SCANNER,
+        scanner=SURVEY.scanner,
         seed=lambda wildcards: stream("survey", "scan", *wildcards),
         positions_m=SURVEY.positions_m,
         height_m=SURVEY.height_m,
@@ -93,7 +93,7 @@ rule survey_candidates:
         mem_mb=3000,
     params:
         stand=stand_settings,
-        scanner=SCANNER,
+        scanner=SURVEY.scanner,
         seed=lambda wildcards: stream("survey", "candidates", *wildcards),
         height_m=SURVEY.height_m,
         voxel_size_m=SURVEY.voxel_size_m,
@@ -120,7 +120,7 @@ rule survey_variants:
         mem_mb=3000,
     params:
         stands={stand: grown(stand, 1) for stand in SURVEY.stands},
-        scanner=SCANNER | {"azimuth_steps_deg": (0.5, 0.1, 0.02)},
+        scanner=SURVEY.scanner | {"azimuth_steps_deg": (0.5, 0.1, 0.02)},
         height_m=SURVEY.height_m,
         voxel_size_m=SURVEY.voxel_size_m,
         cell_size_m=SURVEY.cell_size_m,

@@ -4,15 +4,11 @@ Everywhere else: metres, right-handed, x east, y north, z up, a local origin sub
 azimuth clockwise from north, zenith from straight up, and time in UTC.
 """
 
-import difflib
-import re
-from datetime import timedelta, timezone
-from zoneinfo import ZoneInfo, available_timezones
-
 import numpy as np
 import pandas as pd
 
 from dapple.errors import InputError
+from dapple.timezones import find_timezone
 
 FLOAT32_LIMIT_M = 8192.0
 """Up to here neighbouring float32 numbers are at most 1 mm apart (2**13 m, 24 bits)."""
@@ -136,33 +132,6 @@ def dart_to_local(abc_m: np.ndarray) -> np.ndarray:
 
 
 # --- time -----------------------------------------------------------------------------------
-
-
-def find_timezone(name: str, where: str = "timezone") -> ZoneInfo | timezone:
-    """The zone of an IANA name (`Europe/Berlin`) or of an offset (`+02:00`).
-
-    Raises
-    ------
-    InputError
-        No such zone; the message names the nearest one.
-    """
-    if offset := re.fullmatch(r"([+-])(\d\d):(\d\d)", str(name)):
-        sign, hours, minutes = offset.groups()
-        delta = timedelta(hours=int(hours), minutes=int(minutes))
-        if delta < timedelta(hours=24):
-            return timezone(-delta if sign == "-" else delta)
-    known = available_timezones()
-    if name in known:
-        return ZoneInfo(name)
-    by_lower = {zone.lower(): zone for zone in known}
-    close = difflib.get_close_matches(str(name).lower(), by_lower, n=1, cutoff=0.4)
-    remedy = f"Did you mean '{by_lower[close[0]]}'?" if close else "Use UTC if times are in UTC."
-    raise InputError(
-        where,
-        f"unknown time zone '{name}'",
-        "an IANA name such as Europe/Berlin, or UTC, or an offset such as +02:00",
-        remedy,
-    )
 
 
 def to_utc(timestamps, timezone_name: str | None, where: str = "timestamps") -> pd.DatetimeIndex:

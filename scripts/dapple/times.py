@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from dapple import frames
+from dapple import clock, frames
 from dapple.errors import InputError
 
 
@@ -69,39 +69,8 @@ def parse(column: pd.Series, where: str | Path, timezone: str | None = None) -> 
 
 
 def time_range(start: str, end: str, step_min: float, timezone: str) -> pd.DatetimeIndex:
-    """Times from `start` to `end`, both included where the step meets them, in UTC.
-
-    Parameters
-    ----------
-    start, end : str
-        ISO 8601, on the clock of `timezone` unless they carry an offset.
-    step_min : float
-        Minutes between times.
-    timezone : str
-        Zone of `start` and `end`: IANA name or offset.
-
-    Raises
-    ------
-    InputError
-        Not a time, an unknown zone, no positive step, or an end before the start.
-    """
-    first, last = (
-        parse(pd.Series([str(text)], name=name), "time", timezone)[0]
-        for name, text in (("start", start), ("end", end))
-    )
-    if last < first or not step_min > 0:
-        raise InputError(
-            "time",
-            f"{first} to {last} every {step_min} min",
-            "an end after the start and a positive step",
-            "Exchange the ends or mend the step.",
-        )
-    return pd.date_range(first, last, freq=pd.Timedelta(minutes=step_min), unit="ns")
-
-
-def label(time: pd.Timestamp) -> str:
-    """Name of a time in the names of files, as in 20230810T101000Z; always UTC."""
-    return utc([time])[0].strftime("%Y%m%dT%H%M%SZ")
+    """The times of `clock.time_range` as an index."""
+    return pd.DatetimeIndex(clock.time_range(start, end, step_min, timezone)).as_unit("ns")
 
 
 def spread(times: pd.DatetimeIndex, wanted: Sequence[str], count: int) -> np.ndarray:

@@ -28,7 +28,7 @@ LIGHT = {
     "sky_patches": 145,
     "max_orders": 4,
     "max_shadow_rays": 512,
-    "shadow_tolerance": 0.01,
+    "tolerance": 0.0125,
     "sun_diameter_deg": 0.533,
     "aperture_m": 0.0,
     "sun_kernel_deg": 8.0,

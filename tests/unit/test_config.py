@@ -1,14 +1,18 @@
 """The configuration: one typed source, and mistakes that are told with their remedy."""
 
+import inspect
 import json
 from datetime import UTC, datetime
+from typing import get_args
 
 import pytest
 import yaml
 
-from dapple.config import docs
+from dapple.config import checks, docs
 from dapple.config.settings import Settings, validate
+from dapple.config.stability import Method
 from dapple.errors import InputError, MissingMissesError
+from dapple.stability.reconstructions import METHODS
 
 FILES = sorted(docs.CONFIG.glob("*.yaml"))
 REAL_CLOUD = {
@@ -121,27 +125,151 @@ def test_a_label_that_yaml_takes_for_a_number_asks_for_quotes():
         validate(yaml.safe_load("figures: {sensors: [3_7]}"))
 
 
-@pytest.mark.parametrize(
-    ("config", "found"),
-    [
+REAL_WOOD = {"source": "wood", "measured": {"kind": "none"}, "reconstructions": ["polygons"]}
+CONTRADICTIONS = {
+    "reconstructions": [
         ({"reconstructions": ["voxels_0.3"]}, "voxels_0.3"),
+        ({"reconstructions": ["polygons", "truth", "polygons"]}, "polygons"),
         (REAL_CLOUD | {"reconstructions": ["truth"]}, "truth"),
-        (REAL_CLOUD | {"measured": {"kind": "virtual"}}, "measured.kind: virtual"),
-        ({"source": "cloud", "measured": {"kind": "none"}, "reconstructions": []}, "cloud.path"),
-        ({"source": "wood", "measured": {"kind": "none"}, "reconstructions": []}, "wood_path"),
+    ],
+    "paths": [
+        (REAL_CLOUD | {"cloud": {}}, "cloud.path"),
+        (REAL_WOOD, "wood_path"),
         ({"radiation": {"kind": "table"}}, "radiation.path"),
         ({"sensors": {"kind": "table"}}, "sensors.path"),
         ({"measured": {"kind": "table"}}, "measured.path"),
-        ({"registration": {"fit": True}}, "sensors.kind: grid"),
-        ({"time": {"step_min": 4}}, "time.step_min: 4"),
+    ],
+    "misses": [
         (REAL_CLOUD | {"cloud": {"path": "tree.laz", "shots": "recorded"}}, "tree.laz"),
+        (REAL_CLOUD | {"reconstructions": ["voxels_0.2"]}, "voxels_0.2"),
+    ],
+    "corrections": [
+        (REAL_CLOUD | {"corrections": {"clumping": True}}, "corrections.clumping"),
+        (
+            REAL_WOOD | {"wood_path": "bark.obj", "corrections": {"occlusion": True}},
+            "corrections.occlusion",
+        ),
+    ],
+    "measured": [(REAL_CLOUD | {"measured": {"kind": "virtual"}}, "measured.kind: virtual")],
+    "registration": [({"registration": {"fit": True}}, "sensors.kind: grid")],
+    "times": [
+        ({"time": {"end": "2023-08-10 09:00"}}, "09:00"),
+        (
+            {"time": {"start": "2023-10-29 02:30", "timezone": "Europe/Berlin"}},
+            "daylight saving",
+        ),
+        ({"site": {"timezone": "Europe/Berln"}}, "Europe/Berln"),
+    ],
+    "timesteps": [({"time": {"step_min": 4}}, "time.step_min: 4")],
+    "spectra": [
         ({"optics": {"bark": {"wavelength_nm": [400.0, 500.0, 700.0]}}}, "3 wavelengths"),
     ],
+    "light": [({"light": {"engine": "timestep", "model": "advised"}}, "light.model: advised")],
+    "voxels": [
+        (
+            {"voxels": {"estimator": "contact_frequency", "contact_voxel_m": 0}},
+            "voxels.contact_voxel_m: 0",
+        ),
+    ],
+    "plant": [
+        ({"plant": {"crown_base_m": 6.5}}, "6.5 m in a tree of 6.6 m"),
+        ({"plant": {"leaf_length_min_m": 0.09}}, "leaf_length_max_m 0.08"),
+    ],
+    "figures": [({"figures": {"sensors": ["3_7", "9_1"]}}, "9_1")],
+    "survey": [
+        ({"survey": {"leaf_area_index": [1.0]}}, "survey.leaf_area_index"),
+        ({"survey": {"stands": ["fagus", "quercus"]}}, "quercus"),
+        ({"survey": {"trees_m": [[16.0, 1.0]]}}, "[[16.0, 1.0]]"),
+        ({"survey": {"volume_m": [15.0, 15.0, 20.0]}}, "a height of 20 m"),
+        ({"survey": {"voxel_size_m": 0.35}}, "0.35 m in a box"),
+        ({"survey": {"cell_size_m": 0.25}}, "0.25 m"),
+        ({"survey": {"designs": ["diamond"]}}, "diamond"),
+        ({"survey": {"candidates": 2, "plan_scans": 5}}, "survey.plan_scans: 5"),
+    ],
+    "survey_beams": [
+        ({"survey": {"density_step_deg": 0.3}}, "survey.density_step_deg"),
+        ({"survey": {"azimuth_steps_deg": [0.5, 0.3]}}, "[0.5, 0.3]"),
+        ({"survey": {"designs": ["single", "star"]}}, "star"),
+        ({"survey": {"designs": ["single", "list"]}}, "no position"),
+        (
+            {"survey": {"designs": ["single", "list"], "positions_m": [[16.0, 1.0]]}},
+            "outside the volume",
+        ),
+    ],
+    "chlorophyll": [
+        ({"chlorophyll": {"images": {"pixel_m": 21.0}}}, "chlorophyll.images.pixel_m: 21"),
+        ({"chlorophyll": {"larch": {"dbh_m": 4.0}}}, "chlorophyll.larch.dbh_m: 4"),
+        ({"chlorophyll": {"retrieval": {"n": [2.5, 1.0, 4]}}}, "chlorophyll.retrieval.n"),
+        (
+            {"chlorophyll": {"world": {"lcc_range_ug_cm2": [70.0, 10.0]}}},
+            "chlorophyll.world.lcc_range_ug_cm2",
+        ),
+    ],
+    "stability": [({"stability": {"stressors": ["wnd"]}}, "stability.stressors: wnd")],
+}
+
+
+@pytest.mark.parametrize(
+    ("config", "found"), [case for cases in CONTRADICTIONS.values() for case in cases]
 )
 def test_values_that_contradict_each_other_are_named_together(config, found):
     with pytest.raises(InputError) as error:
-        validate(config)
+        validate(config, "mine.yaml")
     assert found in error.value.found
+    assert error.value.remedy
+
+
+@pytest.mark.parametrize("name", CONTRADICTIONS)
+def test_it_is_the_check_of_that_name_that_finds_them(name):
+    for config, found in CONTRADICTIONS[name]:
+        settings = Settings.model_validate(config)
+        with pytest.raises(InputError) as error:
+            getattr(checks, name)(settings, "mine.yaml")
+        assert found in error.value.found
+
+
+def test_every_check_is_called_and_has_a_case_that_it_finds():
+    written = [
+        name
+        for name, one in inspect.getmembers(checks, inspect.isfunction)
+        if one.__module__ == checks.__name__ and one is not checks.check
+    ]
+    assert sorted(one.__name__ for one in checks.CHECKS) == sorted(written)
+    assert sorted(CONTRADICTIONS) == sorted(written)
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        "reconstructions",
+        "voxels.sizes_m",
+        "survey.stands",
+        "chlorophyll.plots",
+        "chlorophyll.retrieval.models",
+        "chlorophyll.retrieval.seeds",
+        "tradeoff.paths",
+        "advice.voxel_sizes_m",
+    ],
+)
+def test_a_list_that_something_is_taken_from_must_not_be_empty(key):
+    config = []
+    for part in reversed(key.split(".")):
+        config = {part: config}
+    with pytest.raises(InputError, match=key) as error:
+        validate(config)
+    assert "at least 1 item" in error.value.expected
+
+
+def test_a_method_of_the_stability_map_that_there_is_not_is_refused_at_once():
+    assert set(get_args(Method)) == set(METHODS) - {"truth"}
+    with pytest.raises(InputError, match=r"stability\.reconstructions\.0: 'foo'"):
+        validate({"stability": {"reconstructions": ["foo"]}})
+
+
+def test_a_time_that_is_none_is_refused_wherever_one_is_asked_for():
+    for config in ({"time": {"start": "noon"}}, {"figures": {"map_times": ["10.8.2023"]}}):
+        with pytest.raises(InputError, match="ISO 8601"):
+            validate(config)
 
 
 def test_density_from_a_cloud_that_keeps_no_misses_stops_before_anything_runs():

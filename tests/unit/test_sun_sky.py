@@ -3,6 +3,7 @@ import pandas as pd
 import pvlib
 import pytest
 
+from dapple.clock import label
 from dapple.errors import InputError
 from dapple.formats import netcdf as files
 from dapple.optics.bands import par_bands
@@ -10,7 +11,7 @@ from dapple.scene import scene_optics
 from dapple.sky import sky_radiance, sun
 from dapple.sky.patches import SUBDIVISIONS, patches
 from dapple.sky.spectrum import par_spectrum
-from dapple.times import label, parse, time_range, utc
+from dapple.times import parse, time_range, utc
 
 FREIBURG = sun.Site(48.0009, 7.8003, 230.0)
 AFTERNOON = time_range("2023-08-10 12:10", "2023-08-10 18:50", 10, "Europe/Berlin")

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from annotated_types import Gt, Le
 
-from dapple.config.base import Count, Positive, Section, key
+from dapple.config.base import Count, Positive, Section, Some, key
 
 
 class Advice(Section):
@@ -19,9 +19,9 @@ class Advice(Section):
     times: Count = key(9, "times of the pilot")
     paths: Count = key(16_384, "paths, and rays to the sky, of every sensor of the pilot")
     repeats: Count = key(3, "runs of every model, of which the shortest counts as its cost")
-    polygon_sizes_m: tuple[Positive, ...] = key(
+    polygon_sizes_m: Some[Positive] = key(
         (0.025, 0.05, 0.1, 0.2), "voxels of the polygons, the finest first"
     )
-    voxel_sizes_m: tuple[Positive, ...] = key(
+    voxel_sizes_m: Some[Positive] = key(
         (0.1, 0.2, 0.5, 1.0), "edges of the turbid voxels, the finest first"
     )

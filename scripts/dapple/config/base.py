@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
-from datetime import datetime
-from typing import Annotated, Any, Literal
+from datetime import date, datetime
+from typing import Annotated, Any, Literal, TypeVar
 
-from annotated_types import Ge, Gt, Le
+from annotated_types import Ge, Gt, Le, MinLen
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 Positive = Annotated[float, Gt(0)]
 NotNegative = Annotated[float, Ge(0)]
 Share = Annotated[float, Ge(0), Le(1)]
 Count = Annotated[int, Ge(1)]
-# YAML reads a time with seconds as a time, one without as text.
-Moment = Annotated[
-    str, BeforeValidator(lambda value: str(value) if isinstance(value, datetime) else value)
-]
+Item = TypeVar("Item")
+Some = Annotated[tuple[Item, ...], MinLen(1)]
+"""A list that is not empty."""
+
+
+def _moment(value: Any) -> Any:
+    """Text of a time in ISO 8601: YAML reads one with seconds as a time, a day alone as a date."""
+    text = str(value) if isinstance(value, date) else value
+    try:
+        datetime.fromisoformat(text)
+    except (TypeError, ValueError):
+        raise ValueError("a time such as 2023-08-10 10:10 (ISO 8601)") from None
+    return text
+
+
+Moment = Annotated[str, BeforeValidator(_moment)]
 LeafAngles = Literal[
     "spherical", "planophile", "erectophile", "plagiophile", "extremophile", "uniform"
 ]

@@ -1,76 +1,27 @@
-"""What is wrong with a configuration, in words that help: one value, or several together."""
+"""Values of a configuration that contradict each other, or of which one needs another.
+
+All that a configuration alone can tell is found here, before the first job; what is in files is
+found by the step that reads them.
+"""
 
 from __future__ import annotations
 
-import difflib
 from pathlib import PurePath
 from typing import TYPE_CHECKING
 
-from pydantic import BaseModel, ValidationError
-
+from dapple import clock
+from dapple.config.chlorophyll import GridRange
 from dapple.errors import InputError, MissingMissesError
-from dapple.frames import find_timezone
+from dapple.stability import stressors
+from dapple.survey import designs
+from dapple.survey.hemisphere_scanner import Hemisphere
+from dapple.timezones import find_timezone
+from dapple.virtual import plant_sizes
+from dapple.virtual.box_grids import grid_shape, voxels_per_cell
+from dapple.virtual.stand_species import of_stand
 
 if TYPE_CHECKING:
     from dapple.config.settings import Settings
-
-REMEDIES = {
-    "string_type": "Put the value in quotes: YAML takes 3_7 for a number and `no` for false.",
-}
-
-
-def explain(error: ValidationError, settings: type[BaseModel], where: str) -> InputError:
-    """The first complaint of pydantic in our own terms, unknown keys before wrong values.
-
-    Parameters
-    ----------
-    error : ValidationError
-    settings : type of BaseModel
-        The whole configuration, for its valid keys.
-    where : str
-        The files that the configuration comes from.
-    """
-    complaints = error.errors()
-    unknown = [one for one in complaints if one["type"] == "extra_forbidden"]
-    first = (unknown or complaints)[0]
-    key = ".".join(str(part) for part in first["loc"])
-    if unknown:
-        return InputError(
-            where,
-            f"unknown key `{key}`",
-            "a key of config/README.md",
-            _nearest(first["loc"], _keys(settings)),
-        )
-    return InputError(
-        where,
-        f"`{key}: {first['input']!r}`",
-        first["msg"].removeprefix("Input should be "),
-        REMEDIES.get(first["type"], "See config/README.md for the meaning and range of every key."),
-    )
-
-
-def _nearest(location: tuple[int | str, ...], keys: list[str]) -> str:
-    """The key that may have been meant: in its own section, or of that name in another."""
-    *parents, wrong = (str(part) for part in location)
-    beside = [key for key in keys if key.split(".")[:-1] == parents]
-    names = [key.rsplit(".", 1)[-1] for key in beside]
-    if close := difflib.get_close_matches(wrong, names, n=1, cutoff=0.7):
-        return f"Did you mean `{'.'.join([*parents, close[0]])}`?"
-    if elsewhere := [key for key in keys if key.rsplit(".", 1)[-1] == wrong]:
-        return f"Did you mean `{'` or `'.join(elsewhere)}`?"
-    if close := difflib.get_close_matches(wrong, names, n=1, cutoff=0.4):
-        return f"Did you mean `{'.'.join([*parents, close[0]])}`?"
-    return f"Known keys: {', '.join(names)}."
-
-
-def _keys(section: type[BaseModel], prefix: str = "") -> list[str]:
-    """Every valid key, from the section down, with dots between."""
-    found = []
-    for name, field in section.model_fields.items():
-        found.append(f"{prefix}{name}")
-        if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
-            found += _keys(field.annotation, f"{prefix}{name}.")
-    return found
 
 
 def check(settings: Settings, where: str) -> None:
@@ -83,26 +34,23 @@ def check(settings: Settings, where: str) -> None:
     where : str
         The files that they come from.
     """
-    for rule in (
-        _reconstructions,
-        _paths,
-        _misses,
-        _corrections,
-        _measured,
-        _registration,
-        _timesteps,
-        _spectra,
-    ):
-        rule(settings, where)
-    for section in ("site", "time", "radiation"):
-        find_timezone(getattr(settings, section).timezone, f"{where}, `{section}.timezone`")
+    for one in CHECKS:
+        one(settings, where)
 
 
-def _reconstructions(settings: Settings, where: str) -> None:
+def reconstructions(settings: Settings, where: str) -> None:
+    """Each is known, and named once."""
     known = ["polygons", *(f"voxels_{size}" for size in settings.voxels.sizes_m)]
     if settings.source == "virtual":
         known.append("truth")
     for name in settings.reconstructions:
+        if settings.reconstructions.count(name) > 1:
+            raise InputError(
+                where,
+                f"`reconstructions: {list(settings.reconstructions)}`",
+                "each name once",
+                f"Leave out one `{name}`.",
+            )
         if name not in known:
             raise InputError(
                 where,
@@ -113,7 +61,7 @@ def _reconstructions(settings: Settings, where: str) -> None:
             )
 
 
-def _paths(settings: Settings, where: str) -> None:
+def paths(settings: Settings, where: str) -> None:
     """A file is named wherever one is read."""
     needed = {
         "source: wood": ("wood_path", settings.source == "wood", settings.wood_path),
@@ -132,7 +80,7 @@ def _paths(settings: Settings, where: str) -> None:
             )
 
 
-def _misses(settings: Settings, where: str) -> None:
+def misses(settings: Settings, where: str) -> None:
     """Plant area density needs every shot that was fired, those without a return too."""
     cloud = settings.cloud
     if settings.source != "cloud":
@@ -156,7 +104,7 @@ def _misses(settings: Settings, where: str) -> None:
         )
 
 
-def _corrections(settings: Settings, where: str) -> None:
+def corrections(settings: Settings, where: str) -> None:
     """What the scan did not see is known from its shots."""
     wanted = [name for name in ("occlusion", "clumping") if getattr(settings.corrections, name)]
     if wanted and settings.source == "cloud" and settings.cloud.shots == "none":
@@ -166,9 +114,17 @@ def _corrections(settings: Settings, where: str) -> None:
             "shots, from which coverage is known",
             "Set cloud.shots to `recorded` or `scan_frame`, or turn the correction off.",
         )
+    if settings.corrections.occlusion and settings.source == "wood":
+        raise InputError(
+            where,
+            "`corrections.occlusion: true` and `source: wood`",
+            "polygons of scanned leaves; those along real wood are virtual",
+            "Turn the correction off.",
+        )
 
 
-def _measured(settings: Settings, where: str) -> None:
+def measured(settings: Settings, where: str) -> None:
+    """Virtual records need a virtual truth."""
     if settings.measured.kind == "virtual" and settings.source != "virtual":
         raise InputError(
             where,
@@ -178,7 +134,8 @@ def _measured(settings: Settings, where: str) -> None:
         )
 
 
-def _registration(settings: Settings, where: str) -> None:
+def registration(settings: Settings, where: str) -> None:
+    """A fit needs surveyed sensors and their records."""
     if not settings.registration.fit:
         return
     for key, kind in (("sensors", settings.sensors.kind), ("measured", settings.measured.kind)):
@@ -191,7 +148,7 @@ def _registration(settings: Settings, where: str) -> None:
             )
 
 
-def _timesteps(settings: Settings, where: str) -> None:
+def timesteps(settings: Settings, where: str) -> None:
     """Two engines are compared at times that both have."""
     ratio = settings.light.timestep.step_min / settings.time.step_min
     if ratio > 1 and abs(ratio - round(ratio)) > 1e-9:
@@ -204,7 +161,8 @@ def _timesteps(settings: Settings, where: str) -> None:
         )
 
 
-def _spectra(settings: Settings, where: str) -> None:
+def spectra(settings: Settings, where: str) -> None:
+    """A spectrum has a reflectance for each of its wavelengths."""
     for name, spectrum in (("bark", settings.optics.bark), ("ground", settings.optics.ground)):
         if len(spectrum.wavelength_nm) != len(spectrum.reflectance):
             raise InputError(
@@ -216,7 +174,8 @@ def _spectra(settings: Settings, where: str) -> None:
             )
 
 
-def _light(settings: Settings, where: str) -> None:
+def light(settings: Settings, where: str) -> None:
+    """The advice is about the transport engine."""
     if settings.light.model == "advised" and settings.light.engine != "transport":
         raise InputError(
             where,
@@ -224,3 +183,168 @@ def _light(settings: Settings, where: str) -> None:
             "`light.engine: transport`, which the advice is about",
             "Choose the transport engine or `light.model: full`.",
         )
+
+
+def times(settings: Settings, where: str) -> None:
+    """There are times, and zones to read them in."""
+    for section in ("site", "time", "radiation"):
+        find_timezone(getattr(settings, section).timezone, f"{where}, `{section}.timezone`")
+    clock.time_range(**dict(settings.time), where=f"{where}, `time`")
+
+
+def voxels(settings: Settings, where: str) -> None:
+    """The estimator has the sums that it needs."""
+    section = settings.voxels
+    if section.estimator == "contact_frequency" and section.contact_voxel_m == 0:
+        raise InputError(
+            where,
+            "`voxels.estimator: contact_frequency` and `voxels.contact_voxel_m: 0`",
+            "a size of sub-voxels, whose contacts are counted",
+            "Set voxels.contact_voxel_m, for example to 0.05.",
+        )
+
+
+def plant(settings: Settings, where: str) -> None:
+    """The virtual tree has sizes that a tree can have."""
+    tree = settings.plant
+    plant_sizes.check_sizes(
+        tree.height_m, tree.crown_base_m, tree.crown_radius_m, tree.dbh_m, tree.leaf_area_m2
+    )
+    plant_sizes.check_leaves(tree.leaf_length_min_m, tree.leaf_length_max_m)
+
+
+def figures(settings: Settings, where: str) -> None:
+    """Sensors of a grid that are to be drawn exist; those of a table are known when it is read."""
+    grid = settings.sensors
+    known = {f"{row + 1}_{k + 1}" for row in range(grid.rows) for k in range(grid.columns)}
+    unknown = set(settings.figures.sensors) - known
+    if grid.kind == "grid" and unknown:
+        raise InputError(
+            where,
+            f"`figures.sensors: {sorted(unknown)}`",
+            f"labels of the grid, from 1_1 to {grid.rows}_{grid.columns} (row_column)",
+            "Choose among these, or leave the list empty.",
+        )
+
+
+def survey(settings: Settings, where: str) -> None:
+    """Stands can be grown, scanned by every design, and divided into voxels and cells."""
+    section = settings.survey
+    if len(section.stands) != len(section.leaf_area_index):
+        raise InputError(
+            where,
+            f"`survey.leaf_area_index` with {len(section.leaf_area_index)} values for "
+            f"{len(section.stands)} stands",
+            "one for each stand",
+            "Complete the shorter list.",
+        )
+    for species, leaf_area_index in zip(section.stands, section.leaf_area_index, strict=True):
+        of_stand(species, section.trees_m, section.volume_m, leaf_area_index)
+    for edge_m in (section.voxel_size_m, section.cell_size_m):
+        grid_shape(section.volume_m, edge_m)
+    voxels_per_cell(section.cell_size_m, section.voxel_size_m)
+    if "single" not in section.designs:
+        raise InputError(
+            where,
+            f"`survey.designs: {list(section.designs)}`",
+            "`single` among them",
+            "The planner starts from its scan.",
+        )
+    if section.plan_scans > section.candidates**2:
+        raise InputError(
+            where,
+            f"`survey.plan_scans: {section.plan_scans}` and `survey.candidates: "
+            f"{section.candidates}`",
+            f"no more scans than the {section.candidates**2} places of the candidates",
+            "Take fewer scans or more candidates.",
+        )
+
+
+def survey_beams(settings: Settings, where: str) -> None:
+    """Every scan of a design has beams, and density is estimated from one of those fired."""
+    section = settings.survey
+    scanner = Hemisphere(**section.scanner)
+    if section.density_step_deg not in scanner.azimuth_steps_deg:
+        raise InputError(
+            where,
+            f"`survey.density_step_deg: {section.density_step_deg:g}`",
+            f"one of survey.azimuth_steps_deg: {list(scanner.azimuth_steps_deg)}",
+            "Density is estimated from the beams of one of these scans.",
+        )
+    for name in section.designs:
+        places = designs.positions(name, section.volume_m, section.height_m, section.positions_m)
+        scanner.n_azimuth(len(places))
+        inside = (
+            all(0 <= x <= edge for x, edge in zip(place, section.volume_m, strict=True))
+            for place in places
+        )
+        if not all(inside):
+            raise InputError(
+                where,
+                f"`survey.positions_m` or `survey.height_m` with a scanner outside the volume of "
+                f"{list(section.volume_m)} m",
+                "positions inside",
+                "Move it, or enlarge survey.volume_m.",
+            )
+
+
+def chlorophyll(settings: Settings, where: str) -> None:
+    """Plots hold pixels and trees; grids of leaves and soils run upwards."""
+    section = settings.chlorophyll
+    for name in section.plots:
+        plot = getattr(section, name)
+        for key, pixel_m in (("images", section.images.pixel_m), (name, plot.pixel_m)):
+            if pixel_m > min(plot.size_m):
+                raise InputError(
+                    where,
+                    f"`chlorophyll.{key}.pixel_m: {pixel_m:g}` in a plot of "
+                    f"{plot.size_m[0]:g} x {plot.size_m[1]:g} m",
+                    "pixels smaller than the plot",
+                    "Choose smaller pixels.",
+                )
+        if plot.dbh_m > 0.2 * plot.height_m:
+            raise InputError(
+                where,
+                f"`chlorophyll.{name}.dbh_m: {plot.dbh_m:g}` of trees {plot.height_m:g} m high",
+                "trees at least five times as high as thick",
+                "Give the stem's diameter in metres.",
+            )
+    pairs = {"world.lcc_range_ug_cm2": section.world.lcc_range_ug_cm2}
+    for name, value in section.retrieval:
+        if type(section.retrieval).model_fields[name].annotation == GridRange:
+            pairs[f"retrieval.{name}"] = value[:2]
+    for name, (low, high) in pairs.items():
+        if low > high:
+            raise InputError(
+                where,
+                f"`chlorophyll.{name}` from {low:g} to {high:g}",
+                "the least value before the greatest",
+                "Exchange them.",
+            )
+
+
+def stability(settings: Settings, where: str) -> None:
+    """What is to be made worse is known."""
+    for name in settings.stability.stressors:
+        stressors.find(name, where)
+
+
+CHECKS = (
+    reconstructions,
+    paths,
+    misses,
+    corrections,
+    measured,
+    registration,
+    times,
+    timesteps,
+    spectra,
+    light,
+    voxels,
+    plant,
+    figures,
+    survey,
+    survey_beams,
+    chlorophyll,
+    stability,
+)

@@ -1,4 +1,4 @@
-"""Configuration of the chlorophyll experiment."""
+"""Leaf chlorophyll from UAV images and UAV LiDAR."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from annotated_types import Ge, Gt, Le, Lt
 
-from dapple.config.base import Count, NotNegative, Positive, Section, Share, key
+from dapple.config.base import Count, NotNegative, Positive, Section, Share, Some, key
 
 ZHAO = "Zhao et al. 2025"
 ZHANG = "Zhang et al. 2016"
@@ -183,10 +183,10 @@ class Images(Section):
 class Retrieval(Section):
     """Leaves and soils to simulate, training set, network and map."""
 
-    models: tuple[Literal["collision_orders", "semi_less", "prosail"], ...] = key(
+    models: Some[Literal["collision_orders", "semi_less", "prosail"]] = key(
         ("collision_orders", "semi_less", "prosail"), "what simulates the images to learn from"
     )
-    masks: tuple[Literal["sunlit", "all"], ...] = key(
+    masks: Some[Literal["sunlit", "all"]] = key(
         ("sunlit", "all"), "canopy pixels that are averaged: sunlit ones, or all"
     )
     map_pixel_m: Positive = key(3.0, "of training entries and map", ZHAO)
@@ -215,7 +215,7 @@ class Retrieval(Section):
     )
     leaf_angle_deg: Annotated[float, Ge(0), Le(90)] = key(57.0, "SAIL: mean angle; 57 is spherical")
     hot_spot: Positive = key(0.01, "SAIL: leaf size over canopy height")
-    networks: tuple[Literal["robust", "published"], ...] = key(
+    networks: Some[Literal["robust", "published"]] = key(
         ("robust", "published"), "that learn from bands with errors, or from exact ones"
     )
     relative_noise: NotNegative = key(
@@ -224,8 +224,8 @@ class Retrieval(Section):
     absolute_noise: NotNegative = key(
         0.002, "robust: errors of each band and of all together, as reflectance"
     )
-    seeds: tuple[int, ...] = key((1, 2, 3), "one network each; the map is their mean")
-    hidden: tuple[Count, ...] = key((800, 400, 200), "widths of the first hidden layers", ZHAO)
+    seeds: Some[int] = key((1, 2, 3), "one network each; the map is their mean")
+    hidden: Some[Count] = key((800, 400, 200), "widths of the first hidden layers", ZHAO)
     block: Count = key(3, "hidden layers within the residual block", ZHAO)
     learning_rate: Positive = key(0.001, "of Adam", ZHAO)
     last_rate_share: Share = key(0.01, "share of the rate to which it falls, along a cosine")
@@ -246,7 +246,7 @@ class Retrieval(Section):
 class Chlorophyll(Section):
     """Leaf chlorophyll from UAV images and UAV LiDAR."""
 
-    plots: tuple[Literal["larch", "spruce", "user"], ...] = key(("larch", "spruce"), "plots to map")
+    plots: Some[Literal["larch", "spruce", "user"]] = key(("larch", "spruce"), "plots to map")
     margin_m: NotNegative = key(10.0, "surroundings of a plot that shade it")
     larch: Plot = Plot(shoot_recollision=0.06)
     spruce: Plot = Plot(

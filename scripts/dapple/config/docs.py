@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import yaml
-from annotated_types import Ge, Gt, Le
+from annotated_types import Ge, Gt, Le, MinLen
 from pydantic.fields import FieldInfo
 
 from dapple.config.base import Section
@@ -101,6 +101,8 @@ def _range(field: FieldInfo) -> str:
         for limit in field.metadata
         if type(limit) in signs
     ]
+    if any(isinstance(limit, MinLen) for limit in field.metadata):
+        limits.append("not empty")
     choices = getattr(field.annotation, "__args__", ())
     if not limits and choices and all(isinstance(choice, str | int) for choice in choices):
         return ", ".join(f"`{choice}`" for choice in choices)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from annotated_types import Ge, Le
 
-from dapple.config.base import NotNegative, Section, Share, key
+from dapple.config.base import NotNegative, Section, Share, Some, key
 
 
 class LeafOptics(Section):
@@ -23,8 +23,8 @@ class LeafOptics(Section):
 class Spectrum(Section):
     """A reflectance spectrum, linear between its wavelengths."""
 
-    wavelength_nm: tuple[float, ...] = key((400.0, 700.0), "wavelengths, ascending")
-    reflectance: tuple[Share, ...] = key((0.2, 0.2), "one value for each wavelength")
+    wavelength_nm: Some[float] = key((400.0, 700.0), "wavelengths, ascending")
+    reflectance: Some[Share] = key((0.2, 0.2), "one value for each wavelength")
     path: str = key("", "instead: a table of wavelength and reflectance, relative to data_dir")
 
 

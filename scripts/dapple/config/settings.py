@@ -13,12 +13,13 @@ from pydantic import Field, ValidationError
 
 from dapple.config import checks
 from dapple.config.advice import Advice
-from dapple.config.base import Section, key
+from dapple.config.base import Section, Some, key
 from dapple.config.chlorophyll import Chlorophyll
 from dapple.config.classify import Classify
 from dapple.config.clean import Clean
 from dapple.config.cloud import CloudInput
 from dapple.config.corrections import Corrections
+from dapple.config.explain import explain
 from dapple.config.figures import Figures
 from dapple.config.leaves import Leaves
 from dapple.config.light import Light
@@ -56,7 +57,7 @@ class Settings(Section):
     source: Literal["virtual", "wood", "cloud"] = key(
         "virtual", "a virtual tree and scan, real wood with virtual leaves, or a point cloud"
     )
-    reconstructions: tuple[str, ...] = key(
+    reconstructions: Some[str] = key(
         ("polygons", "voxels_0.2", "voxels_1.0", "truth"), "what light is computed for"
     )
     ground_z_m: float = key(0.0, "height of the flat ground in the tree's frame")
@@ -103,6 +104,6 @@ def validate(config: dict[str, Any], where: str = "configuration") -> Settings:
     try:
         settings = Settings.model_validate(config)
     except ValidationError as error:
-        raise checks.explain(error, Settings, where) from None
+        raise explain(error, Settings, where) from None
     checks.check(settings, where)
     return settings

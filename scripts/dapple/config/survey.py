@@ -1,32 +1,32 @@
-"""Configuration of the survey of scanning designs."""
+"""The survey of scanning designs."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from annotated_types import Ge, Gt, Le
 
-from dapple.config.base import LMS, ZANDE, Count, NotNegative, Positive, Section, Share, key
+from dapple.config.base import LMS, ZANDE, Count, NotNegative, Positive, Section, Share, Some, key
 
 
 class Survey(Section):
     """Where to put a scanner: designs, shadowing and correction in virtual stands."""
 
-    stands: tuple[str, ...] = key(("fagus", "platanus"), "species of the stands", ZANDE)
-    leaf_area_index: tuple[Positive, ...] = key((4.50, 5.15), "of each stand", ZANDE)
+    stands: Some[str] = key(("fagus", "platanus"), "species of the stands", ZANDE)
+    leaf_area_index: Some[Positive] = key((4.50, 5.15), "of each stand", ZANDE)
     volume_m: tuple[Positive, Positive, Positive] = key((15.0, 15.0, 30.0), "edges", ZANDE)
-    trees_m: tuple[tuple[float, float], ...] = key(
+    trees_m: Some[tuple[float, float]] = key(
         ((3.75, 3.75), (11.25, 3.75), (3.75, 11.25), (11.25, 11.25)), "places of the trees"
     )
     grown: Count = key(2, "different trees in a stand; others are turned copies")
     replicates: Annotated[int, Ge(2)] = key(3, "stands of each species, each of other trees")
-    designs: tuple[str, ...] = key(
+    designs: Some[str] = key(
         ("single", "diamond", "corners"), "scan designs; `list` takes positions_m", ZANDE
     )
     positions_m: tuple[tuple[float, float], ...] = key((), "positions of the design `list`")
     height_m: NotNegative = key(1.3, "height of the scanner above the ground")
     zenith_step_deg: Annotated[float, Gt(0), Le(10)] = key(0.25, "step from 0 to 90", LMS)
-    azimuth_steps_deg: tuple[Annotated[float, Gt(0), Le(30)], ...] = key(
+    azimuth_steps_deg: Some[Annotated[float, Gt(0), Le(30)]] = key(
         (0.5, 0.2, 0.1, 0.04, 0.02), "of one scan; k scans take k times these", ZANDE
     )
     beam_divergence_mrad: NotNegative = key(4.4, "full angle of the beam, 0.25°", LMS)
@@ -46,3 +46,20 @@ class Survey(Section):
     plan_scans: Annotated[int, Ge(2), Le(12)] = key(6, "planner: largest number of scans")
     kriging_range_m: Positive = key(2.0, "distance over which density is alike, for the fill")
     kriging_neighbours: Annotated[int, Ge(3), Le(64)] = key(16, "known cells that fill a cell")
+
+    @property
+    def scanner(self) -> dict[str, Any]:
+        """What the scanner is like, as `survey.hemisphere_scanner.Hemisphere` takes it."""
+        return self.model_dump(
+            include={
+                "zenith_step_deg",
+                "azimuth_steps_deg",
+                "beam_divergence_mrad",
+                "exit_aperture_m",
+                "sub_rays",
+                "reflectance",
+                "min_energy",
+                "pulse_m",
+                "max_returns",
+            }
+        )

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Literal
 
-from dapple.config.base import FREY, Count, LeafAngles, NotNegative, Positive, Section, key
+from dapple.config.base import FREY, Count, LeafAngles, NotNegative, Positive, Section, Some, key
 
 
 class Voxels(Section):
     """Plant area density."""
 
-    sizes_m: tuple[Positive, ...] = key((0.2, 1.0), "edges of the voxels", FREY)
+    sizes_m: Some[Positive] = key((0.2, 1.0), "edges of the voxels", FREY)
     estimator: Literal["transmittance", "ppl", "fpl", "fpl_biased", "contact_frequency"] = key(
         "fpl", "bias-corrected free path length", "Pimont et al. 2018"
     )

@@ -1,7 +1,6 @@
 """Measured and simulated PAR through the day, one small panel per sensor."""
 
 from collections.abc import Sequence
-from zoneinfo import ZoneInfo
 
 import matplotlib.dates as mdates
 import numpy as np
@@ -11,6 +10,7 @@ from matplotlib.figure import Figure
 
 from dapple.errors import InputError
 from dapple.figures import style
+from dapple.timezones import find_timezone
 
 
 def choose_sensors(per_sensor: pd.DataFrame, *, reconstruction: str, count: int = 6) -> list[str]:
@@ -142,7 +142,7 @@ def _time_axis(axes: Axes, times: pd.Series) -> None:
 
 
 def _time_note(times: pd.Series, timezone: str) -> str:
-    local = times.min().tz_convert(ZoneInfo(timezone))
+    local = times.min().tz_convert(find_timezone(timezone))
     hours = local.utcoffset().total_seconds() / 3600
     return f"UTC on {times.min():%d %B %Y} (local time: UTC {hours:+g} h, {timezone})"
 

@@ -260,7 +260,7 @@ class Chain:
                 loaded,
                 places,
                 series.towards_sun(sky),
-                tolerance=settings["shadow_tolerance"] / np.sqrt(factor),
+                tolerance=series.DIRECT_SHARE * settings["tolerance"] / np.sqrt(factor),
                 max_rays=settings["max_shadow_rays"] * factor,
                 seed=stream_seed(seed, "sun"),
                 sun_diameter_deg=settings["sun_diameter_deg"],

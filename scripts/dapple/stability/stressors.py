@@ -298,8 +298,8 @@ STRESSORS = {
 }
 
 
-def find(name: str) -> Stressor:
-    """A stressor by its name.
+def find(name: str, where: str = "stability") -> Stressor:
+    """A stressor by its name; `where` is named when there is none.
 
     Raises
     ------
@@ -308,6 +308,9 @@ def find(name: str) -> Stressor:
     """
     if name not in STRESSORS:
         raise InputError(
-            "stability.stressors", f"`{name}`", f"one of {', '.join(STRESSORS)}", "Choose these."
+            where,
+            f"`stability.stressors: {name}`",
+            f"one of {', '.join(STRESSORS)}",
+            "Choose among these; empty: all.",
         )
     return STRESSORS[name]

@@ -42,7 +42,7 @@ class Setup:
         As rule `sky` passes them on.
     light : dict
         `sky_rays`, `paths`, `sky_patches`, `max_orders`, `bands`, `max_shadow_rays`,
-        `shadow_tolerance`, `sun_diameter_deg`, `aperture_m`, `sun_kernel_deg`, `variant` and
+        `tolerance`, `sun_diameter_deg`, `aperture_m`, `sun_kernel_deg`, `variant` and
         `truth_factor`, how many times more rays the truth gets.
     ground_z_m : float
         Height of the ground [m].

@@ -10,8 +10,8 @@ from dapple.structure.voxels import Grid, plant_area_density
 from dapple.survey.correction import CLASSES, contact_frequency, coverage_classes
 from dapple.survey.fill import krige
 from dapple.survey.hemisphere import Beams
-from dapple.survey.shadow import voxels_per_cell
 from dapple.survey.voxel_status import Reach, attribute
+from dapple.virtual.box_grids import voxels_per_cell
 
 LARGEST_GRID = 200_000_000
 

@@ -1,9 +1,8 @@
 """Where scanners stand."""
 
-import numpy as np
-
 from dapple.errors import InputError
 
+Position = tuple[float, float, float]
 _CENTRE = ((0.5, 0.5),)
 _SHARES = {
     "single": _CENTRE,
@@ -17,7 +16,7 @@ def positions(
     size_m: tuple[float, float, float],
     height_m: float,
     own_m: tuple[tuple[float, float], ...] = (),
-) -> np.ndarray:
+) -> list[Position]:
     """Scan positions of a design.
 
     Parameters
@@ -34,8 +33,8 @@ def positions(
 
     Returns
     -------
-    (n, 3) float64
-        Frame of the stand [m].
+    list of three floats
+        East, north and height in the frame of the stand [m].
 
     Raises
     ------
@@ -43,25 +42,24 @@ def positions(
         An unknown design or an empty list.
     """
     if design == "list":
-        places = np.array(own_m, np.float64).reshape(-1, 2)
+        places = [(float(x), float(y)) for x, y in own_m]
     elif design in _SHARES:
-        places = np.array(_SHARES[design]) * np.asarray(size_m)[:2]
+        places = [(x * size_m[0], y * size_m[1]) for x, y in _SHARES[design]]
     else:
         raise InputError(
             "survey.designs", design, ", ".join([*_SHARES, "list"]), "Choose among these."
         )
-    if not len(places):
+    if not places:
         raise InputError(
             "survey.positions_m",
             "no position",
             "at least one, for the design `list`",
             "Give pairs of x and y in metres.",
         )
-    return np.column_stack([places, np.full(len(places), height_m)])
+    return [(x, y, height_m) for x, y in places]
 
 
-def candidates(size_m: tuple[float, float, float], height_m: float, along: int) -> np.ndarray:
-    """A square grid of `along` x `along` places from edge to edge, (n, 3) [m]."""
-    x, y = (np.linspace(0, edge, along) for edge in size_m[:2])
-    places = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-    return np.column_stack([places, np.full(len(places), height_m)])
+def candidates(size_m: tuple[float, float, float], height_m: float, along: int) -> list[Position]:
+    """A square grid of `along` x `along` places from edge to edge [m]."""
+    x, y = ([edge * k / (along - 1) for k in range(along)] for edge in size_m[:2])
+    return [(east, north, height_m) for east in x for north in y]

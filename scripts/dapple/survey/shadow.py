@@ -20,25 +20,6 @@ def in_cells(voxels: np.ndarray, per_edge: int, reduce: str = "mean") -> np.ndar
     return getattr(blocks, reduce)(axis=(1, 3, 5))
 
 
-def voxels_per_cell(cell_size_m: float, voxel_size_m: float) -> int:
-    """Voxels along the edge of a cell.
-
-    Raises
-    ------
-    InputError
-        One does not divide the other.
-    """
-    ratio = cell_size_m / voxel_size_m
-    if ratio < 1 or abs(ratio - round(ratio)) > 1e-6:
-        raise InputError(
-            "survey.cell_size_m",
-            f"{cell_size_m:g} m with voxels of {voxel_size_m:g} m",
-            "a multiple of survey.voxel_size_m",
-            "Contact frequency counts the voxels in a cell.",
-        )
-    return round(ratio)
-
-
 def relative_shadow(attribute: np.ndarray, filled: np.ndarray) -> dict[str, float]:
     """Shares of the truly filled voxels that a scan did not see.
 

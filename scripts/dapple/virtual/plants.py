@@ -10,6 +10,7 @@ from dapple.formats.meshes import Mesh, concatenate
 from dapple.streams import stream_seed
 from dapple.virtual import leaf_shapes, plant_skeleton, plant_tubes
 from dapple.virtual.plant_shoots import Shoots, sprout
+from dapple.virtual.plant_sizes import TWIG_RADIUS_M, check_leaves, check_sizes
 from dapple.virtual.plant_skeleton import Skeleton
 
 _SPARE = 1.06  # leaves made for each one asked, to drop some by chance
@@ -81,7 +82,7 @@ def apple_tree(
     leaf_length_max_m: float = 0.08,
     leaf_angle_distribution: str = "spherical",
     leaf_fold_deg: float = 10.0,
-    twig_radius_m: float = 0.0015,
+    twig_radius_m: float = TWIG_RADIUS_M,
     n_clumps: int = 70,
     twigs_per_leaf_m2: float = 25.0,
     seed: int,
@@ -128,8 +129,8 @@ def apple_tree(
     -----
     Default size: the tree of Frey et al. (2025), section 2.1. Petioles are not meshed.
     """
-    _check(height_m, crown_base_m, crown_radius_m, dbh_m, leaf_area_m2, twig_radius_m)
-    _check_leaves(leaf_length_min_m, leaf_length_max_m, leaf_fold_deg, n_clumps)
+    check_sizes(height_m, crown_base_m, crown_radius_m, dbh_m, leaf_area_m2, twig_radius_m)
+    check_leaves(leaf_length_min_m, leaf_length_max_m, leaf_fold_deg, n_clumps)
     n_tips = max(round(twigs_per_leaf_m2 * leaf_area_m2), 30)
     skeleton = plant_skeleton.grow(
         height_m, crown_base_m, crown_radius_m, n_tips, n_clumps, _rng(seed, "skeleton")
@@ -221,48 +222,3 @@ def _diameter(branches: plant_tubes.Axes, height_m: float) -> float:
 def _hull_m2(points_m: np.ndarray) -> float:
     """Area of the convex hull of points seen from above [m²]."""
     return float(ConvexHull(points_m[:, :2]).volume)
-
-
-def _check(height_m, crown_base_m, crown_radius_m, dbh_m, leaf_area_m2, twig_radius_m) -> None:
-    sizes = {
-        "height_m": height_m,
-        "crown_base_m": crown_base_m,
-        "crown_radius_m": crown_radius_m,
-        "leaf_area_m2": leaf_area_m2,
-        "twig_radius_m": twig_radius_m,
-    }
-    for name, size in sizes.items():
-        if not (np.isfinite(size) and size > 0):
-            raise InputError(
-                f"plant.{name}", f"{size:g}", "a number above 0", "Give the size of a tree."
-            )
-    if height_m - crown_base_m < 0.3:
-        raise InputError(
-            "plant.crown_base_m",
-            f"{crown_base_m:g} m in a tree of {height_m:g} m",
-            "at least 0.3 m less than the height",
-            "Lower the crown base (a third of the height is common) or raise the height.",
-        )
-    if not 4 * twig_radius_m <= dbh_m < crown_base_m:
-        raise InputError(
-            "plant.dbh_m",
-            f"{dbh_m:g} m",
-            f"{4 * twig_radius_m:g} m (twice the thickness of twigs) to {crown_base_m:g} m",
-            "Give the stem's diameter in metres.",
-        )
-
-
-def _check_leaves(length_min_m, length_max_m, fold_deg, n_clumps) -> None:
-    if not 0 < length_min_m <= length_max_m:
-        raise InputError(
-            "plant.leaf_length_min_m",
-            f"{length_min_m:g} m, with leaf_length_max_m {length_max_m:g} m",
-            "0 < leaf_length_min_m <= leaf_length_max_m",
-            "Swap them or mend the units: metres.",
-        )
-    if not 0 <= fold_deg < 90:
-        raise InputError(
-            "plant.leaf_fold_deg", f"{fold_deg:g}°", "0° to below 90°", "0 makes flat leaves."
-        )
-    if n_clumps < 1:
-        raise InputError("plant.n_clumps", f"{n_clumps}", "at least 1", "70 is usual.")

@@ -6,41 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
 from dapple.streams import stream_seed
+from dapple.virtual.box_grids import grid_shape
 from dapple.virtual.plants import Plant, apple_tree
-
-SPECIES: dict[str, dict] = {
-    # dense fine branching, many small flat leaves in layers (European beech)
-    "fagus": {
-        "height_m": 26.0,
-        "crown_base_m": 4.0,
-        "crown_radius_m": 3.35,
-        "dbh_m": 0.42,
-        "leaf_length_min_m": 0.06,
-        "leaf_length_max_m": 0.10,
-        "leaf_angle_distribution": "planophile",
-        "leaf_fold_deg": 5.0,
-        "n_clumps": 400,
-        "twigs_per_leaf_m2": 20.0,
-    },
-    # few thick branches, large leaves at all angles, gathered in clumps with gaps (plane tree)
-    "platanus": {
-        "height_m": 28.0,
-        "crown_base_m": 7.0,
-        "crown_radius_m": 3.35,
-        "dbh_m": 0.55,
-        "leaf_length_min_m": 0.14,
-        "leaf_length_max_m": 0.22,
-        "leaf_angle_distribution": "plagiophile",
-        "leaf_fold_deg": 12.0,
-        "twig_radius_m": 0.003,
-        "n_clumps": 60,
-        "twigs_per_leaf_m2": 4.0,
-    },
-}
-"""Full-grown trees of a closed stand, as parameters of `plants.apple_tree`."""
+from dapple.virtual.stand_species import of_stand
 
 
 @dataclass(frozen=True)
@@ -124,34 +94,9 @@ def grow(
     InputError
         An unknown species, no tree, or a tree outside the box.
     """
-    if species not in SPECIES:
-        raise InputError(
-            "survey.stands", species, ", ".join(SPECIES), "Name a species that dapple can grow."
-        )
+    settings = of_stand(species, positions_m, size_m, leaf_area_index, **changes)
     positions_m = np.asarray(positions_m, np.float64).reshape(-1, 2)
     n, size = len(positions_m), np.asarray(size_m, np.float64)
-    if n == 0 or not leaf_area_index > 0:
-        raise InputError(
-            "survey.trees_m",
-            f"{n} trees, leaf area index {leaf_area_index:g}",
-            "at least one tree with leaves",
-            "An empty stand has nothing to scan.",
-        )
-    if ((positions_m < 0) | (positions_m >= size[:2])).any():
-        raise InputError(
-            "survey.trees_m",
-            str(positions_m.tolist()),
-            f"positions from 0 to {size[0]:g} and {size[1]:g} m",
-            "Move the trees into survey.volume_m or enlarge it.",
-        )
-    settings = SPECIES[species] | changes
-    if settings["height_m"] > size[2]:
-        raise InputError(
-            "survey.volume_m",
-            f"a height of {size[2]:g} m",
-            f"at least the trees' {settings['height_m']:g} m",
-            "Raise the volume.",
-        )
     leaf_area_m2 = leaf_area_index * size[0] * size[1] / n
     plants = tuple(
         apple_tree(
@@ -189,25 +134,6 @@ def area_in_voxels(stand: Stand, part: str, voxel_size_m: float) -> np.ndarray:
     for corners in stand.triangles(part):
         _add_area(np.ascontiguousarray(corners), voxel_size_m, area)
     return area
-
-
-def grid_shape(size_m: np.ndarray, voxel_size_m: float) -> tuple[int, int, int]:
-    """Voxels along each edge of a box.
-
-    Raises
-    ------
-    InputError
-        The voxels do not fill the box exactly.
-    """
-    count = np.asarray(size_m, np.float64) / voxel_size_m
-    if not np.allclose(count, np.round(count), atol=1e-6) or (count < 0.5).any():
-        raise InputError(
-            "survey.voxel_size_m",
-            f"{voxel_size_m:g} m in a box of {' x '.join(f'{s:g}' for s in size_m)} m",
-            "a size that divides every edge",
-            "Choose voxels and volume so that one divides the other.",
-        )
-    return tuple(int(c) for c in np.round(count))
 
 
 @njit(cache=True)
