@@ -2,9 +2,9 @@
 
 import pandas as pd
 
+from dapple.cloud import ordered, selection
 from dapple.cloud.ingest import shots_from_scan
 from dapple.cloud.lattice import ScanFrame
-from dapple.cloud.ordered import shots_from_ptx
 from dapple.formats import clouds, shots
 from dapple.frames import to_local
 from dapple.workflow import run
@@ -12,22 +12,33 @@ from dapple.workflow import run
 
 def main(snakemake):
     params, path = snakemake.params, snakemake.input.cloud
-    cloud = clouds.read(path)
+    cloud, source = selection.take(*clouds.read_with_source(path), path)
     for attribute in params.required:
-        clouds.require(cloud, attribute, path)
+        clouds.require(cloud, attribute, path, source.notes)
     print(f"{path}: {len(cloud)} points, origin {cloud.origin_m.tolist()}")
+    print(*(f"left out: {n:,} points, {why}" for why, n in source.left_out.items()), sep="\n")
+    print(*source.notes, sep="\n")
     clouds.write(snakemake.output.points, cloud)
+    facts = {"scans": []}
     match params.shots:
         case "recorded":
-            fired, facts = shots_from_ptx(path, origin_m=cloud.origin_m)
+            fired = _recorded(path, cloud.origin_m, facts)
+            shots.write_chunks(snakemake.output.shots, fired, facts)
         case "scan_frame":
             position_m = _scan_position(snakemake.input.positions, cloud)
             frame = ScanFrame(**params.scan_frame)
             fired, facts = shots_from_scan(cloud, position_m, frame, source=path)
+            shots.write(snakemake.output.shots, fired, {"scans": facts})
         case "none":
             return
     print(facts)
-    shots.write(snakemake.output.shots, fired, {"scans": facts})
+
+
+def _recorded(path, origin_m, facts):
+    """The shots of every scan, in pieces; facts of the scans are noted on the way."""
+    for fired, fact in ordered.shots_from_file(path, origin_m):
+        facts["scans"].append(fact)
+        yield from shots.parts(fired)
 
 
 def _scan_position(path, cloud):

@@ -4,7 +4,9 @@ import os
 import shlex
 import shutil
 import subprocess
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from dapple.errors import InputError
@@ -79,3 +81,16 @@ def failure(command: Sequence[str | Path], state: str, output: str) -> ProgramEr
         "exit code 0 and a result",
         "Run the command by hand to see more; check the input file and the free disk space.",
     )
+
+
+@contextmanager
+def silenced(descriptor: int) -> Iterator[None]:
+    """Send what a compiled library prints past Python's own output (1 or 2) into nothing."""
+    kept = os.dup(descriptor)
+    try:
+        with tempfile.TemporaryFile() as nothing:
+            os.dup2(nothing.fileno(), descriptor)
+            yield
+    finally:
+        os.dup2(kept, descriptor)
+        os.close(kept)

@@ -5,9 +5,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from dapple import frames
-from dapple.cloud import ingest, lattice
+from dapple.cloud import ingest, lattice, ordered
 from dapple.cloud.lattice import ScanFrame
-from dapple.cloud.ordered import shots_from_ptx
 from dapple.errors import EmptyCloudError, InputError
 from dapple.formats import clouds
 from dapple.formats.clouds import Cloud
@@ -207,6 +206,12 @@ def write_ptx(path, hit, position=(410505.0, 5317088.0, 290.0), noise_deg=0.0, c
     return direction @ rotation.T
 
 
+def all_shots(path, **options):
+    """Shots of a file of one scan, around the origin of its cloud, and their facts."""
+    ((shots, facts),) = ordered.shots_from_file(path, clouds.read(path).origin_m, **options)
+    return shots, facts
+
+
 def window(columns=(0, COLUMNS), rows=(0, ROWS)):
     hit = np.zeros((COLUMNS, ROWS), bool)
     hit[slice(*columns), slice(*rows)] = True
@@ -226,7 +231,7 @@ def window(columns=(0, COLUMNS), rows=(0, ROWS)):
 )
 def test_directions_of_empty_ptx_shots_follow_the_grid_even_at_empty_borders(tmp_path, hit):
     direction = write_ptx(tmp_path / "a.ptx", hit)
-    shots, (facts,) = shots_from_ptx(tmp_path / "a.ptx", lowest_miss_zenith_deg=180)
+    shots, facts = all_shots(tmp_path / "a.ptx", lowest_miss_zenith_deg=180)
     assert facts["n_misses"] == (~hit).sum()
     off = np.degrees(np.linalg.norm(shots.direction - direction.reshape(-1, 3), axis=1))
     assert off.max() < 0.01
@@ -237,14 +242,14 @@ def test_noisy_ptx_directions_do_not_tilt_the_extrapolation(tmp_path):
     rng = np.random.default_rng(2)
     hit[15] = hit[59] = rng.random(ROWS) < 0.2  # thin outer columns
     direction = write_ptx(tmp_path / "a.ptx", hit, noise_deg=0.3)
-    shots, _ = shots_from_ptx(tmp_path / "a.ptx", lowest_miss_zenith_deg=180)
+    shots, _ = all_shots(tmp_path / "a.ptx", lowest_miss_zenith_deg=180)
     off = np.degrees(np.linalg.norm(shots.direction - direction.reshape(-1, 3), axis=1))
     assert np.percentile(off, 99) < 1.5  # their own scatter, of a 5° step
 
 
 def test_ptx_shots_and_points_share_origin_and_place(tmp_path):
     write_ptx(tmp_path / "a.ptx", window(rows=(0, 22)), colours=" 10 20 30")
-    shots, _ = shots_from_ptx(tmp_path / "a.ptx")
+    shots, _ = all_shots(tmp_path / "a.ptx")
     cloud = clouds.read(tmp_path / "a.ptx")
     assert np.array_equal(shots.world_origin_m, cloud.origin_m)
     assert shots.return_xyz_m == pytest.approx(cloud.xyz_m, abs=1e-5)
@@ -255,4 +260,4 @@ def test_ptx_shots_and_points_share_origin_and_place(tmp_path):
 def test_a_ptx_that_is_no_grid_is_refused(tmp_path):
     write_ptx(tmp_path / "a.ptx", window(), noise_deg=8.0)
     with pytest.raises(InputError, match=r"a.ptx, scan 1: found azimuth .* off its grid"):
-        shots_from_ptx(tmp_path / "a.ptx")
+        all_shots(tmp_path / "a.ptx")

@@ -132,7 +132,7 @@ def test_a_cloud_without_reflectance_names_the_file_what_it_has_and_what_else_wo
     clouds.write(path, some_cloud(Deviation=np.ones(3000, np.float32)))
     message = refused(tmp_path, path)
     assert "no attribute 'Reflectance' (there are: Deviation)" in message
-    assert "choose a method that does without" in message
+    assert "choose a method that does without it" in message
     assert len(ingest(tmp_path, path, required=())) == 3000
 
 

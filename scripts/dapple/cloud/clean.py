@@ -10,8 +10,8 @@ from pathlib import Path
 import laspy
 import numpy as np
 
+from dapple import pdal as pdal_program
 from dapple.cloud import cloudcompare as cc
-from dapple.cloud import pdal as pdal_program
 from dapple.cloud import voxel_groups
 from dapple.errors import EmptyCloudError, InputError
 from dapple.formats import clouds

@@ -1,21 +1,15 @@
 """Ground under an airborne cloud: cloth simulation, elevation and canopy height models."""
 
-import contextlib
-import os
-import tempfile
-from collections.abc import Iterator
-
 import CSF
 import numpy as np
 from scipy import ndimage
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
+from dapple.cloud.selection import without_marked
 from dapple.errors import EmptyCloudError, InputError
 from dapple.formats.clouds import Cloud
 from dapple.formats.rasters import Raster
-
-NOISE_CLASSES = (7, 18)
-"""ASPRS: low and high noise."""
+from dapple.programs import silenced
 
 
 def isolated(xyz_m: np.ndarray, *, cell_m: float, most_points: int) -> np.ndarray:
@@ -106,7 +100,7 @@ def cloth(
     filter_.params.class_threshold = threshold_m
     filter_.setPointCloud(np.ascontiguousarray(xyz_m, np.float64))
     ground, above = CSF.VecInt(), CSF.VecInt()
-    with _quiet():
+    with silenced(1):
         filter_.do_filtering(ground, above, False)
     mask = np.zeros(len(xyz_m), bool)
     mask[np.asarray(ground, dtype=np.int64)] = True
@@ -127,19 +121,6 @@ def _covered(xyz_m: np.ndarray, mask: np.ndarray, cell_m: float) -> float:
     cell = np.floor((xyz_m[:, :2] - xyz_m[:, :2].min(axis=0)) / cell_m).astype(np.int64)
     key = cell[:, 0] * (cell[:, 1].max() + 1) + cell[:, 1]
     return len(np.unique(key[mask])) / len(np.unique(key))
-
-
-@contextlib.contextmanager
-def _quiet() -> Iterator[None]:
-    """Send what a library prints past Python's own output into nothing."""
-    kept = os.dup(1)
-    try:
-        with tempfile.TemporaryFile() as nothing:
-            os.dup2(nothing.fileno(), 1)
-            yield
-    finally:
-        os.dup2(kept, 1)
-        os.close(kept)
 
 
 def grid_of(world_xy_m: np.ndarray, pixel_m: float) -> tuple[float, float, int, int]:
@@ -256,17 +237,15 @@ def canopy_height(
 
 
 def without_noise(cloud: Cloud, where: str, *, cell_m: float, most_points: int) -> Cloud:
-    """Drop points that the file calls noise (classes 7 and 18) and isolated ones.
+    """Drop points that the file calls noise or withholds, and isolated ones.
 
     Raises
     ------
     EmptyCloudError
         Nothing is left.
     """
-    if "Classification" in cloud.attributes:
-        cloud = cloud.select(~np.isin(cloud.attributes["Classification"], NOISE_CLASSES))
-    if len(cloud):
-        cloud = cloud.select(~isolated(cloud.xyz_m, cell_m=cell_m, most_points=most_points))
+    cloud = without_marked(cloud, where)[0]
+    cloud = cloud.select(~isolated(cloud.xyz_m, cell_m=cell_m, most_points=most_points))
     if not len(cloud):
         raise EmptyCloudError(
             where,

@@ -1,4 +1,4 @@
-"""Ordered scans (PTX): the shots that met nothing are there, but their directions are not.
+"""Ordered scans (PTX, E57): the shots that met nothing are there, but their directions are not.
 
 A missing direction is taken from the grid: azimuth runs with the column, zenith with the row. Each
 is a straight line fitted to the columns (rows) that have returns, plus what single columns deviate
@@ -6,106 +6,104 @@ from it, interpolated between them. Beyond the outermost column with returns the
 on, with the deviation of the last column: single noisy columns never set the slope.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from dapple import frames
 from dapple.cloud.lattice import spherical
 from dapple.errors import EmptyCloudError, InputError
-from dapple.formats import cloud_ptx
-from dapple.formats import shots as shots_format
-from dapple.formats.cloud_ptx import PtxScan
+from dapple.formats import clouds
+from dapple.formats.ordered_scan import OrderedScan
 from dapple.formats.shots import Shots
 
 LEAST_RETURNS = 5
 """Columns and rows with fewer returns do not take part in the fit."""
 
 
-def shots_from_ptx(
-    path: str | Path, *, lowest_miss_zenith_deg: float = 100.0, origin_m: np.ndarray | None = None
-) -> tuple[Shots, list[dict]]:
-    """Every shot of a PTX file, those without return included.
+def shots_from_file(
+    path: str | Path, origin_m: np.ndarray, *, lowest_miss_zenith_deg: float = 100.0
+) -> Iterator[tuple[Shots, dict]]:
+    """Shots of a file of ordered scans, scan by scan, those without return included.
 
     Parameters
     ----------
     path : str or Path
-        PTX file, one or more scans.
+        PTX or E57.
+    origin_m : (3,) array_like
+        World coordinates of the local origin [m], as of `clouds.read(path)`.
     lowest_miss_zenith_deg : float
         Shots without a return that point further down are left out: something nearer than the
         least range stood in the way.
-    origin_m : (3,) array_like, optional
-        World coordinates of the local origin [m]; by default the one of `clouds.read(path)`.
 
-    Returns
-    -------
+    Yields
+    ------
     shots : Shots
-        Column by column; scans numbered from 1.
-    facts : list of dict
-        One a scan: counts, share of misses, steps and residuals of the grid.
+        Column by column; scans numbered as in the file.
+    facts : dict
+        Counts, share of misses, steps and residuals of the grid. A scan that has almost no return
+        gives no shots: where it looked is not known, and it says nothing of the tree.
 
     Raises
     ------
     InputError
         A damaged file, or a scan whose directions are no grid.
     """
-    scans = list(cloud_ptx.scans(path))
-    if origin_m is None:
-        origin_m = _origin(path, scans)
-    parts, facts = [], []
-    for number, scan in enumerate(scans, 1):
-        shots, fact = shots_of_grid(
-            scan,
-            number,
-            np.asarray(origin_m, float),
-            lowest_miss_zenith_deg=lowest_miss_zenith_deg,
-            source=f"{path}, scan {number}",
-        )
-        parts.append(shots)
-        facts.append({"scan": number} | fact)
-    return shots_format.concatenate(parts), facts
+    for number, scan in clouds.ordered_scans(path):
+        try:
+            yield shots_of_grid(
+                scan,
+                number,
+                np.asarray(origin_m, float),
+                lowest_miss_zenith_deg=lowest_miss_zenith_deg,
+                source=f"{path}, scan {number}",
+            )
+        except EmptyCloudError as error:
+            yield _nothing(origin_m), {"scan": number, "skipped": error.found}
 
 
 def shots_of_grid(
-    scan: PtxScan,
+    scan: OrderedScan,
     number: int,
     origin_m: np.ndarray,
     *,
     lowest_miss_zenith_deg: float = 100.0,
     source: str | Path = "scan",
 ) -> tuple[Shots, dict]:
-    """The shots of one ordered scan; see `shots_from_ptx`."""
-    hit = scan.hit
-    zenith, azimuth, range_m = (
-        values.reshape(hit.shape) for values in spherical(scan.xyz_m.reshape(-1, 3))
-    )
-    usable = hit & (np.sin(zenith) > 0.25)  # azimuth is vague near the axis
-    columns = _fit_angle(azimuth, usable, 2 * np.pi, source, "azimuth", "columns")
-    rows = _fit_angle(zenith.T, usable.T, None, source, "zenith", "rows")
-    direction = np.where(
-        hit[..., None],
-        scan.xyz_m / np.where(hit, range_m, 1.0)[..., None],
-        _grid_directions(rows.angle, columns.angle),
-    )
-    direction = direction.reshape(-1, 3) @ scan.rotation.T
-    lowest = np.cos(np.radians(lowest_miss_zenith_deg))
-    met = hit.ravel()
-    kept = met | (direction[:, 2] >= lowest)
-    n_returns = met[kept].astype(np.int64)
-    unknown = np.full(int(n_returns.sum()), np.nan, np.float32)
+    """The shots of one ordered scan; see `shots_from_file`.
+
+    Columns run in azimuth and rows in zenith; where that does not fit, the other way round.
+    """
+    zenith, azimuth, range_m = spherical(scan.xyz_m)
+    scan, columns, rows = _fitted(scan, (zenith, azimuth, range_m), source)
+    order = np.lexsort((range_m, scan.cell))
+    cell, first = np.unique(scan.cell[order], return_index=True)
+    last = np.append(first[1:], len(order)) - 1
+    n_cells = scan.shape[0] * scan.shape[1]
+    # The farthest return tells the direction best: its rounding counts least.
+    direction = _grid_directions(rows.angle, columns.angle).reshape(-1, 3)
+    farthest = order[last]
+    direction[cell] = scan.xyz_m[farthest] / range_m[farthest, None]
+    direction = direction @ scan.rotation.T
+    count = np.zeros(n_cells, np.int64)
+    count[cell] = np.diff(np.append(first, len(order)))
+    kept = (count > 0) | (direction[:, 2] >= np.cos(np.radians(lowest_miss_zenith_deg)))
+    n_returns = count[kept]
+    unknown = np.full(len(order), np.nan, np.float32)
     shots = Shots(
-        np.tile(scan.position_m - origin_m, (len(n_returns), 1)),
+        np.broadcast_to(scan.position_m - origin_m, (len(n_returns), 3)),
         direction[kept],
         np.full(len(n_returns), number, np.uint16),
         np.concatenate([[0], np.cumsum(n_returns)]),
-        range_m.ravel()[met],
-        unknown,
-        unknown,
+        range_m[order],
+        scan.attributes.get("Reflectance", unknown)[order].astype(np.float32),
+        scan.attributes.get("Deviation", unknown)[order].astype(np.float32),
         np.asarray(origin_m, float),
     )
     misses = int((n_returns == 0).sum())
     facts = {
+        "scan": number,
         "n_shots": len(shots),
         "n_misses": misses,
         "share_of_misses": misses / len(shots),
@@ -116,6 +114,54 @@ def shots_of_grid(
         "zenith_residual_deg": rows.residual_deg,
     }
     return shots, facts
+
+
+def _nothing(origin_m: np.ndarray) -> Shots:
+    """No shot at all."""
+    none = np.empty(0, np.float32)
+    return Shots(
+        np.empty((0, 3)),
+        np.empty((0, 3)),
+        np.empty(0, np.uint16),
+        np.zeros(1, np.int64),
+        np.empty(0),
+        none,
+        none,
+        np.asarray(origin_m, float),
+    )
+
+
+def _fitted(scan: OrderedScan, places, source) -> tuple[OrderedScan, "_Angle", "_Angle"]:
+    """The scan with its columns in azimuth, and the angles of its columns and rows."""
+    try:
+        return scan, *_fit_grid(scan, *places, source)
+    except EmptyCloudError:
+        raise
+    except InputError as error:
+        try:
+            return scan.transposed(), *_fit_grid(scan.transposed(), *places, source)
+        except InputError:
+            raise error from None
+
+
+def _fit_grid(scan: OrderedScan, zenith, azimuth, range_m, source) -> tuple["_Angle", "_Angle"]:
+    """Azimuth of every column and zenith of every row."""
+    usable = np.sin(zenith) > 0.25  # azimuth is vague near the axis
+    around = _on_grid(scan, azimuth, range_m)
+    down = _on_grid(scan, zenith, range_m)
+    good = np.isfinite(around)
+    good[scan.column, scan.row] &= usable
+    columns = _fit_angle(around, good, 2 * np.pi, source, "azimuth", "columns")
+    rows = _fit_angle(down.T, good.T, None, source, "zenith", "rows")
+    return columns, rows
+
+
+def _on_grid(scan: OrderedScan, values: np.ndarray, range_m: np.ndarray) -> np.ndarray:
+    """(columns, rows) the value of the farthest return of every shot, NaN without return."""
+    grid = np.full(scan.shape, np.nan)
+    order = np.argsort(range_m, kind="stable")
+    grid[scan.column[order], scan.row[order]] = values[order]
+    return grid
 
 
 @dataclass(frozen=True)
@@ -197,14 +243,3 @@ def _first_step(index: np.ndarray, middle: np.ndarray, turn: float | None) -> fl
             rest = _short_way(middle[reach:] - middle[:-reach] - step * apart, turn)
             step += float(np.median(rest / apart))
     return step
-
-
-def _origin(path: str | Path, scans: list[PtxScan]) -> np.ndarray:
-    corners = []
-    for scan in scans:
-        if scan.hit.any():
-            world = scan.xyz_m[scan.hit] @ scan.rotation.T + scan.position_m
-            corners += [world.min(axis=0), world.max(axis=0)]
-    if not corners:
-        raise EmptyCloudError(path, "0 points", "at least one point", "Check the export.")
-    return frames.choose_origin(np.array(corners))

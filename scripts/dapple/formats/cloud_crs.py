@@ -1,11 +1,22 @@
-"""The coordinate system of a LAS or LAZ file, in metres and without its heights."""
+"""The coordinate system of a LAS or LAZ file, its units, and its name without heights."""
 
+import contextlib
+import struct
+from collections.abc import Mapping
 from pathlib import Path
 
-import laspy
 import pyproj
+from pyproj.crs import CompoundCRS
 
 from dapple.errors import InputError
+from dapple.formats import cloud_las_header
+from dapple.formats.cloud_raw import Units
+
+USER, WKT, GEO_KEYS = "LASF_Projection", 2112, 34735
+PROJECTED, GEOGRAPHIC, VERTICAL, LINEAR, VERTICAL_LINEAR = 3072, 2048, 4096, 3076, 4099
+"""Numbers of GeoTIFF keys."""
+LINEAR_UNITS = {9001: 1.0, 9002: 0.3048, 9003: 1200 / 3937}
+"""Metre, international foot and foot of the US survey, by EPSG number."""
 
 REPROJECT = (
     "Reproject the cloud into a projected system in metres, for example with `pdal translate in.laz"
@@ -63,8 +74,7 @@ def horizontal(path: str | Path, declared: str = "") -> str:
 def _in_header(path: Path) -> pyproj.CRS | None:
     """The file's own system; a record that cannot be read is an error, not a missing one."""
     try:
-        with laspy.open(path) as reader:
-            return reader.header.parse_crs()
+        return of_records(cloud_las_header.read(path).records)
     except pyproj.exceptions.CRSError as error:
         raise InputError(
             path,
@@ -72,11 +82,80 @@ def _in_header(path: Path) -> pyproj.CRS | None:
             "WKT or GeoTIFF keys of a known system",
             "Write it anew with PDAL's writers.las.a_srs.",
         ) from error
-    # laspy and its back ends raise many kinds of error on damaged files.
-    except Exception as error:
-        raise InputError(
-            path, f"a damaged file ({error})", "a LAS or LAZ file", "Copy or export it again."
-        ) from error
+
+
+def of_records(records: Mapping[tuple[str, int], list[bytes]]) -> pyproj.CRS | None:
+    """The coordinate system that the records of a LAS file name: WKT before GeoTIFF keys.
+
+    Raises
+    ------
+    pyproj.exceptions.CRSError
+        There is one that pyproj does not know.
+    """
+    for record in records.get((USER, WKT), []):
+        if text := record.decode("utf-8", "replace").strip("\0 \n"):
+            return pyproj.CRS.from_wkt(text)
+    keys = _geo_keys(records)
+    horizontal = next((keys[k] for k in (PROJECTED, GEOGRAPHIC) if _is_epsg(keys.get(k, 0))), None)
+    if horizontal is None:
+        return None
+    crs = pyproj.CRS.from_epsg(horizontal)
+    if _is_epsg(keys.get(VERTICAL, 0)):
+        with contextlib.suppress(pyproj.exceptions.CRSError):  # heights alone may be unknown
+            return CompoundCRS(f"{crs.name} + height", [crs, pyproj.CRS.from_epsg(keys[VERTICAL])])
+    return crs
+
+
+def describe(records: Mapping[tuple[str, int], list[bytes]]) -> tuple[str, Units, tuple[str, ...]]:
+    """Name of the coordinate system of a LAS file, its units, and notes; an unknown one is a note.
+
+    Returns
+    -------
+    name : str
+        "EPSG:…" or WKT; empty where there is none or none that can be read.
+    units : Units
+    notes : tuple of str
+    """
+    try:
+        crs = of_records(records)
+    except pyproj.exceptions.CRSError as error:
+        said = " ".join(str(error).split())[:120]
+        return "", Units(), (f"The coordinate system of the file cannot be read ({said}).",)
+    keys = _geo_keys(records)
+    found = Units() if crs is None else units(crs)
+    if crs is None or not found.degrees:
+        across = LINEAR_UNITS.get(keys.get(LINEAR, 0), found.horizontal_m)
+        own = crs is not None and crs.is_compound
+        up = found.vertical_m if own else LINEAR_UNITS.get(keys.get(VERTICAL_LINEAR, 0), across)
+        found = Units(across, up)
+    return ("" if crs is None else _name(crs)), found, ()
+
+
+def units(crs: pyproj.CRS) -> Units:
+    """Metres of a unit of east and north and of a unit of height, or that they are degrees."""
+    flat = _flat(crs)
+    if flat.is_geographic:
+        return Units(degrees=True)
+    across = flat.axis_info[0].unit_conversion_factor if flat.axis_info else 1.0
+    heights = [a.unit_conversion_factor for a in crs.axis_info if a.direction == "up"]
+    # A system without heights: they are in the same unit.
+    return Units(across, heights[0] if heights else across)
+
+
+def _geo_keys(records: Mapping[tuple[str, int], list[bytes]]) -> dict[int, int]:
+    """GeoTIFF keys that hold a number themselves."""
+    keys = {}
+    for record in records.get((USER, GEO_KEYS), []):
+        words = struct.unpack(f"<{len(record) // 2}H", record[: len(record) // 2 * 2])
+        for at in range(4, len(words) - 3, 4):
+            key, location, _, value = words[at : at + 4]
+            if location == 0:
+                keys[key] = value
+    return keys
+
+
+def _is_epsg(code: int) -> bool:
+    return 1024 <= code <= 32766
 
 
 def _parse(where: str, text: str) -> pyproj.CRS:

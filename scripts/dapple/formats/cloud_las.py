@@ -9,14 +9,19 @@ import pyproj
 
 from dapple import frames
 from dapple.errors import InputError
+from dapple.formats import cloud_crs, cloud_las_extra, cloud_las_header, cloud_laz
 from dapple.formats.atomic import atomic
-from dapple.formats.cloud_raw import RawCloud, attribute_name
+from dapple.formats.cloud_las_extra import ExtraField
+from dapple.formats.cloud_las_header import Header
+from dapple.formats.cloud_raw import RawCloud, Source, joined
 
 STANDARD = {
     "Intensity": "intensity",
     "ReturnNumber": "return_number",
     "NumberOfReturns": "number_of_returns",
     "Classification": "classification",
+    "Synthetic": "synthetic",
+    "Withheld": "withheld",
     "PointSourceId": "point_source_id",
     "UserData": "user_data",
     "GpsTime": "gps_time",
@@ -31,39 +36,36 @@ SCAN_ANGLE_STEP_DEG = 0.006
 VLR_USER, VLR_ID = "dapple", 1
 """Names the standard fields that mean something: LAS cannot tell class 0 from never classified."""
 
-PDAL_OWN = {"ClassFlags"}
-"""Extra dimensions that PDAL adds by itself when it keeps all."""
-
 CHUNK = 1_000_000
+MOST_BYTES = 1 << 26
+"""Of a chunk in memory: points may be as long as 65,535 bytes."""
 
 
 def read(path: Path) -> RawCloud:
     """Read a whole LAS or LAZ file, chunk by chunk."""
-    xyz, attributes, filled = None, {}, 0
-    for raw, expected in _chunks(path, CHUNK):
-        if xyz is None:
-            xyz, origin = np.empty((expected, 3)), raw.origin_m
-            attributes = {k: np.empty(expected, v.dtype) for k, v in raw.attributes.items()}
-        xyz[filled : filled + len(raw.xyz_m)] = raw.xyz_m
-        for name, values in raw.attributes.items():
-            attributes[name][filled : filled + len(values)] = values
-        filled += len(raw.xyz_m)
-    if xyz is None:
-        return RawCloud(np.empty((0, 3)))
-    named = _declared(path)
+    header = cloud_las_header.read(path)
+    pieces = [{"xyz": raw.xyz_m, **raw.attributes} for raw in _chunks(path, header, CHUNK)]
+    n = sum(len(piece["xyz"]) for piece in pieces)
+    crs, units, notes = cloud_crs.describe(header.records)
+    step = float(header.scale[:2].max())
+    source = Source(n, crs, units, step, notes=(*notes, *_notes(header)))
+    if not pieces:
+        return RawCloud(np.empty((0, 3)), source=source)
+    attributes = joined(pieces)
+    xyz = attributes.pop("xyz")
+    named = _declared(header)
     # A field that is 0 everywhere was never filled, unless the file says that it was.
     kept = {
         name: values
         for name, values in attributes.items()
         if name in named or name not in FIELDS or (named == set() and values.any())
     }
-    return RawCloud(xyz, origin, kept)
+    return RawCloud(xyz, _origin(header), kept, True, source)
 
 
 def iterate(path: Path, chunk: int) -> Iterator[RawCloud]:
     """Chunks of at most `chunk` points with one origin and all fields."""
-    for raw, _ in _chunks(path, chunk):
-        yield raw
+    yield from _chunks(path, cloud_las_header.read(path), chunk)
 
 
 def write(path: Path, raw: RawCloud, scale_m: float = 1e-4, crs: str | None = None) -> None:
@@ -134,68 +136,58 @@ def _whole(path: Path, name: str, values: np.ndarray) -> np.ndarray:
     return values.astype(np.uint16 if limit == 65535 else np.uint8)
 
 
-def _chunks(path: Path, chunk: int) -> Iterator[tuple[RawCloud, int]]:
-    """Points of each chunk with every field, and how many points the file announces."""
-    seen = 0
-    try:
-        with laspy.open(path, laz_backend=_backend()) as reader:
-            header = reader.header
-            origin = _origin(header)
-            for points in reader.chunk_iterator(chunk):
-                seen += len(points)
-                yield _chunk(points, header, origin), header.point_count
-    except InputError:
-        raise
-    # laspy and its LAZ back end raise many kinds of error on damaged files.
-    except Exception as error:
-        raise _damaged(path, f"{type(error).__name__}: {error}") from error
-    if seen < header.point_count:
-        raise _damaged(path, f"{seen} of the {header.point_count} points that it announces")
+def _chunks(path: Path, header: Header, chunk: int) -> Iterator[RawCloud]:
+    """Points of each chunk with every field."""
+    kind = laspy.PointFormat(header.point_format)
+    if n_extra := header.record_bytes - kind.size:
+        kind.add_extra_dimension(laspy.ExtraBytesParams("extra", f"{n_extra}u1"))
+    origin, fields = _origin(header), _extra_fields(header, n_extra)[0]
+    chunk = max(1, min(chunk, MOST_BYTES // header.record_bytes))
+    blocks = cloud_laz.blocks if header.compressed else cloud_laz.plain_blocks
+    for block in blocks(path, header, chunk):
+        yield _chunk(laspy.PackedPointRecord.from_buffer(block, kind), header, origin, fields)
 
 
-def _backend():
-    backends = laspy.LazBackend.detect_available()
-    return [b for b in backends if b.name != "Lazrs"] + [b for b in backends if b.name == "Lazrs"]
+def _extra_fields(header: Header, n_extra: int) -> tuple[list[ExtraField], tuple[str, ...]]:
+    records = header.records.get(cloud_las_header.EXTRA_BYTES, [])
+    return cloud_las_extra.describe(records, n_extra, FIELDS)
 
 
-def _damaged(path: Path, found: str) -> InputError:
-    return InputError(
-        path, f"a damaged file ({found})", "a complete LAS or LAZ file", "Copy or export it again."
-    )
+def _notes(header: Header) -> tuple[str, ...]:
+    n_extra = header.record_bytes - laspy.PointFormat(header.point_format).size
+    return (*header.notes, *_extra_fields(header, n_extra)[1])
 
 
-def _origin(header: laspy.LasHeader) -> np.ndarray:
+def _origin(header: Header) -> np.ndarray:
     """The file's offset, unless coordinates from there are too large for float32."""
-    offset = np.asarray(header.offsets, float) + 0.0
-    corners = np.stack([header.mins, header.maxs]).astype(float)
+    offset = header.offset + 0.0
+    corners = np.stack([header.low, header.high])
     if offset.any() and np.abs(corners - offset).max() <= frames.FLOAT32_LIMIT_M:
         return offset
     return frames.choose_origin(corners)
 
 
-def _chunk(points, header: laspy.LasHeader, origin: np.ndarray) -> RawCloud:
+def _chunk(points, header: Header, origin: np.ndarray, fields: list[ExtraField]) -> RawCloud:
     xyz = np.empty((len(points), 3))
-    shift = np.asarray(header.offsets, float) - origin
+    shift = header.offset - origin
     for axis, name in enumerate("XYZ"):
-        np.multiply(points[name], header.scales[axis], out=xyz[:, axis])
+        np.multiply(points[name], header.scale[axis], out=xyz[:, axis])
         if shift[axis]:
             xyz[:, axis] += shift[axis]
-    present = set(header.point_format.dimension_names)
+    present = set(points.point_format.dimension_names)
     attributes = {n: np.array(points[f]) for n, f in STANDARD.items() if f in present}
     if "scan_angle" in present:
         attributes["ScanAngle"] = np.float32(SCAN_ANGLE_STEP_DEG) * np.array(points["scan_angle"])
     elif "scan_angle_rank" in present:
         attributes["ScanAngle"] = np.array(points["scan_angle_rank"], np.float32)
-    for name in header.point_format.extra_dimension_names:
-        if name not in PDAL_OWN:
-            attributes[attribute_name(name)] = np.array(points[name])
+    for field in fields:
+        extra = np.asarray(points.array["extra"]).reshape(len(points), -1)
+        attributes |= cloud_las_extra.values(extra, field)
     return RawCloud(xyz, origin, attributes, final=True)
 
 
-def _declared(path: Path) -> set[str]:
+def _declared(header: Header) -> set[str]:
     """Standard fields that the file says are in use; empty for files that do not say."""
-    with laspy.open(path) as reader:
-        for vlr in reader.header.vlrs:
-            if vlr.user_id == VLR_USER and vlr.record_id == VLR_ID:
-                return set(vlr.record_data_bytes().decode().split(","))
+    for record in header.records.get((VLR_USER, VLR_ID), []):
+        return set(record.decode("ascii", "replace").split(","))
     return set()

@@ -1,51 +1,95 @@
-"""Points in PLY files: ASCII and binary, with CloudCompare's scalar fields."""
+"""Points in PLY files: ASCII and binary, CloudCompare's scalar fields, ray clouds."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from dapple import frames
 from dapple.errors import InputError
+from dapple.formats import ply_elements
 from dapple.formats.atomic import atomic
-from dapple.formats.cloud_raw import RawCloud, attribute_name
+from dapple.formats.cloud_raw import RawCloud, Source, attribute_name, columns, distinct
+from dapple.formats.ply_elements import damaged
 
-TYPES = {
-    **dict.fromkeys(("char", "int8"), "i1"),
-    **dict.fromkeys(("uchar", "uint8"), "u1"),
-    **dict.fromkeys(("short", "int16"), "i2"),
-    **dict.fromkeys(("ushort", "uint16"), "u2"),
-    **dict.fromkeys(("int", "int32"), "i4"),
-    **dict.fromkeys(("uint", "uint32"), "u4"),
-    **dict.fromkeys(("float", "float32"), "f4"),
-    **dict.fromkeys(("double", "float64"), "f8"),
-}
 NAMES = {"i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort", "i4": "int", "u4": "uint"}
-ORIGIN = "comment origin_m"
+ORIGIN = "origin_m"
+RAY_FIELDS = {"time", "nx", "ny", "nz", "alpha"}
+"""Of a ray cloud: the vector from a ray's end back to its start, and 0 where nothing was met."""
+
+
+@dataclass(frozen=True)
+class Rays:
+    """Rays of a ray cloud in the file's coordinates.
+
+    Attributes
+    ----------
+    start_m, end_m : (n, 3) float64
+        Where the laser was, and where the ray ended [m].
+    met : (n,) bool
+        False where the ray met nothing: its end is then no surface.
+    """
+
+    start_m: np.ndarray
+    end_m: np.ndarray
+    met: np.ndarray
 
 
 def read(path: Path) -> RawCloud:
-    """Read the vertices; faces and other elements after them are left alone."""
+    """Read the vertices; faces and other elements are left alone, rays that met nothing as well."""
+    values, header = _vertices(path)
+    xyz = _axes(values, "xyz")
+    _check_precision(path, xyz, {name: values[name].dtype.str[1:] for name in "xyz"})
+    left_out, met = {}, None
+    others = [name for name in values if name not in "xyz"]
+    if _is_ray_cloud(values):
+        met = values["alpha"] > 0
+        left_out["ray that met nothing"] = int((~met).sum())
+        others = [name for name in others if name not in RAY_FIELDS - {"time"}]
+        values, xyz = {name: values[name][met] for name in others}, xyz[met]
+    names = distinct(attribute_name(name) for name in others)
+    attributes = {}
+    for name, found in zip(others, names, strict=True):
+        attributes |= columns(found, values[name])
+    source = Source(len(xyz) + sum(left_out.values()), left_out=left_out)
+    if header.origin is None:
+        return RawCloud(xyz, attributes=attributes, source=source)
+    local = frames.to_local(xyz, header.origin)
+    return RawCloud(local, header.origin, attributes, True, source)
+
+
+def read_rays(path: Path) -> Rays | None:
+    """The rays of a ray cloud; None where the file is none."""
+    values, _ = _vertices(path)
+    if not _is_ray_cloud(values):
+        return None
+    end = _axes(values, "xyz")
+    return Rays(end + _axes(values, ("nx", "ny", "nz")), end, values["alpha"] > 0)
+
+
+def _is_ray_cloud(values: dict[str, np.ndarray]) -> bool:
+    """Its fields are there, and what would be normals are not of length 1."""
+    if not values.keys() >= RAY_FIELDS or not len(values["alpha"]):
+        return False
+    length = np.linalg.norm(_axes(values, ("nx", "ny", "nz")), axis=1)
+    return bool(np.mean(np.abs(length - 1) < 1e-3) < 0.9)
+
+
+def _axes(values: dict[str, np.ndarray], names) -> np.ndarray:
+    return np.stack([np.asarray(values[axis], float) for axis in names], axis=1)
+
+
+def _vertices(path: Path) -> tuple[dict[str, np.ndarray], ply_elements.Header]:
+    """Values of the vertices by property."""
+    size = path.stat().st_size
     with path.open("rb") as handle:
-        form, count, fields, origin = _header(path, handle)
-        if form == "ascii":
-            values = _read_ascii(path, handle, count, fields)
-        else:
-            order = "<" if form == "binary_little_endian" else ">"
-            dtype = np.dtype([(name, order + kind) for name, kind in fields])
-            data = handle.read(count * dtype.itemsize)
-            if len(data) < count * dtype.itemsize:
-                raise _damaged(path, f"{len(data) // dtype.itemsize} of {count} vertices")
-            values = np.frombuffer(data, dtype)
-    xyz = np.stack([np.asarray(values[axis], float) for axis in "xyz"], axis=1)
-    _check_precision(path, xyz, dict(fields))
-    attributes = {
-        attribute_name(name): np.asarray(values[name]).astype(kind)
-        for name, kind in fields
-        if name not in "xyz"
-    }
-    if origin is None:
-        return RawCloud(xyz, attributes=attributes)
-    return RawCloud(frames.to_local(xyz, origin), origin, attributes, final=True)
+        header = ply_elements.read_header(path, handle)
+        for element in header.elements:
+            if element.name != "vertex":
+                ply_elements.skip(path, handle, header.form, element, size)
+                continue
+            return ply_elements.read(path, handle, header.form, element, size), header
+    raise damaged(path, "no vertices")
 
 
 def write(path: Path, raw: RawCloud) -> None:
@@ -65,7 +109,7 @@ def write(path: Path, raw: RawCloud) -> None:
     for name, values in columns.items():
         table[name] = values
     header = ["ply", "format binary_little_endian 1.0"]
-    header += [f"{ORIGIN} " + " ".join(repr(float(value)) for value in raw.origin_m)]
+    header += [f"comment {ORIGIN} " + " ".join(repr(float(value)) for value in raw.origin_m)]
     header += [f"element vertex {len(table)}", *(f"property double {axis}" for axis in "xyz")]
     header += [
         f"property {NAMES.get(values.dtype.str[1:], 'float')} {name}"
@@ -74,49 +118,6 @@ def write(path: Path, raw: RawCloud) -> None:
     with atomic(path) as partial, partial.open("wb") as handle:
         handle.write(("\n".join([*header, "end_header"]) + "\n").encode())
         table.tofile(handle)
-
-
-def _header(path: Path, handle):
-    """Format, number of vertices, their (name, type) pairs, and the origin if one is named."""
-    if handle.readline().strip() != b"ply":
-        raise _damaged(path, "a first line that is not 'ply'")
-    form, count, fields, origin, element = "", None, [], None, ""
-    while (line := handle.readline().decode("ascii", "replace").strip()) != "end_header":
-        words = line.split()
-        if not words:
-            raise _damaged(path, "a header without end_header")
-        if words[0] == "format":
-            form = words[1]
-        elif line.startswith(ORIGIN):
-            origin = np.array([float(word) for word in words[2:5]])
-        elif words[0] == "element":
-            element = words[1]
-            if count is None and element != "vertex":
-                raise _damaged(path, f"element '{element}' before 'vertex'")
-            if element == "vertex":
-                count = int(words[2])
-        elif words[0] == "property" and element == "vertex":
-            if words[1] not in TYPES:
-                raise _damaged(path, f"vertex property '{' '.join(words[1:])}'")
-            fields.append((words[-1], TYPES[words[1]]))
-    if form not in ("ascii", "binary_little_endian", "binary_big_endian"):
-        raise _damaged(path, f"format '{form}'")
-    if count is None or not {"x", "y", "z"} <= {name for name, _ in fields}:
-        raise _damaged(path, "no vertices with x, y and z")
-    return form, count, fields, origin
-
-
-def _read_ascii(path: Path, handle, count: int, fields) -> dict[str, np.ndarray]:
-    lines = [line for line, _ in zip(handle, range(count), strict=False)]
-    if len(lines) < count:
-        raise _damaged(path, f"{len(lines)} of {count} vertices")
-    if not count:
-        return {name: np.empty(0) for name, _ in fields}
-    try:
-        table = np.loadtxt(lines, ndmin=2, usecols=range(len(fields)))
-    except ValueError as error:
-        raise _damaged(path, str(error)) from error
-    return {name: table[:, k] for k, (name, _) in enumerate(fields)}
 
 
 def _check_precision(path: Path, xyz: np.ndarray, kinds: dict[str, str]) -> None:
@@ -131,9 +132,3 @@ def _check_precision(path: Path, xyz: np.ndarray, kinds: dict[str, str]) -> None
                 f"double coordinates, or values below {frames.FLOAT32_LIMIT_M:.0f} m",
                 "Export with 'double' coordinates or as LAZ, or subtract an offset before export.",
             )
-
-
-def _damaged(path: Path, found: str) -> InputError:
-    return InputError(
-        path, found, "a complete PLY file of points", "Export it again, binary little endian."
-    )

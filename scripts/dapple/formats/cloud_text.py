@@ -1,4 +1,4 @@
-"""Text tables of points: whitespace, comma or semicolon, with or without a header."""
+"""Text tables of points: any separator, with or without a header, with units, several scans."""
 
 import re
 import warnings
@@ -9,38 +9,79 @@ import pandas as pd
 
 from dapple import frames
 from dapple.errors import InputError
+from dapple.formats import text_layout
 from dapple.formats.atomic import atomic
-from dapple.formats.cloud_raw import RawCloud, attribute_name
+from dapple.formats.cloud_raw import RawCloud, ScanFacts, Source, Units, attribute_name, distinct
+from dapple.formats.text_layout import Layout
 
-AXES = {"x": 0, "y": 1, "z": 2, "x_m": 0, "y_m": 1, "z_m": 2}
+PTS_COLUMNS = ("X", "Y", "Z", "Intensity", "Red", "Green", "Blue")
 
 
 def read(path: Path) -> RawCloud:
-    """Read `X Y Z` and further named columns; without a header the first three are X Y Z."""
-    skip, names, separator = _layout(path)
+    """Read `X Y Z` and further named columns; without a header the first three are X Y Z.
+
+    A line that holds one number alone is the number of points that follow, as in PTS files: where
+    there are several, each begins a scan, and `PointSourceId` counts them from 1.
+    """
+    layout = text_layout.find(path)
+    if layout is None:
+        return RawCloud(np.empty((0, 3)))
+    if layout.header is None and path.suffix.lower() == ".pts" and layout.width in (4, 7):
+        layout = layout.named(PTS_COLUMNS[: layout.width])
+    table = read_table(path, layout)
+    table, scan = _without_counts(table)
+    order, factor, degrees = _axes(path, layout)
+    notes: list[str] = []
+    columns = {}
+    for name in order:
+        columns[name] = _numbers(path, table[name], layout)
+    others = [name for name in layout.names if name not in order]
+    ours = distinct(attribute_name(name) for name in others)
+    attributes = {}
+    for name, found in zip(others, ours, strict=True):
+        values = _attribute(table[name], name, notes)
+        if values is not None:
+            attributes[found] = values
+    if scan is not None and "PointSourceId" not in attributes:
+        attributes["PointSourceId"] = scan
+    xyz = np.stack([columns[name] * factor[axis] for axis, name in enumerate(order)], axis=1)
+    scans = ()
+    if scan is not None:
+        numbers, counts = np.unique(scan, return_counts=True)
+        scans = tuple(ScanFacts(int(k), None, int(n)) for k, n in zip(numbers, counts, strict=True))
+    notes += [
+        f"Column {name} is in units of {f:g} m: turned into metres."
+        for name, f in zip(order, factor, strict=True)
+        if f != 1.0
+    ]
+    units = Units(degrees=degrees)
+    source = Source(len(xyz), units=units, notes=tuple(notes), scans=scans)
+    return RawCloud(xyz, attributes=attributes, source=source)
+
+
+def read_table(path: Path, layout: Layout) -> pd.DataFrame:
+    """The rows of a table as the layout says, text where a column is not all numbers."""
     try:
         with warnings.catch_warnings():
             # Lines longer than the header would be cut with no more than a warning.
             warnings.simplefilter("error", pd.errors.ParserWarning)
-            table = pd.read_csv(
+            return pd.read_csv(
                 path,
-                sep=separator,
-                skiprows=skip,
+                sep=layout.separator,
+                skiprows=layout.skip,
                 header=None,
-                names=names,
+                names=layout.names,
                 index_col=False,
                 comment="#",
+                decimal=layout.decimal,
+                encoding=layout.encoding,
+                encoding_errors="replace",
+                low_memory=False,
             )
-    except (pd.errors.ParserError, pd.errors.ParserWarning, UnicodeDecodeError) as error:
-        raise _damaged(path, str(error).strip()) from error
-    for name in table.columns:
-        if len(table) and table[name].dtype.kind not in "iufb":
-            _name_the_bad_cell(path, table[name], skip)
-    order = [next(n for n in names if AXES.get(n.lower()) == axis) for axis in range(3)]
-    attributes = {
-        attribute_name(name): table[name].to_numpy() for name in names if name not in order
-    }
-    return RawCloud(table[order].to_numpy(float), attributes=attributes)
+    except pd.errors.EmptyDataError:
+        return pd.DataFrame(columns=layout.names, dtype=float)
+    except (pd.errors.ParserError, pd.errors.ParserWarning, ValueError) as error:
+        raise wrong(path, " ".join(str(error).split())[:200]) from error
 
 
 def write(path: Path, raw: RawCloud) -> None:
@@ -54,62 +95,63 @@ def write(path: Path, raw: RawCloud) -> None:
         table.to_csv(partial, sep=separator, index=False, na_rep="nan")
 
 
-def _layout(path: Path) -> tuple[int, list[str], str]:
-    """How many lines to skip, the column names, the separator."""
-    with path.open(encoding="utf-8-sig", errors="replace") as handle:
-        head = [line for _, line in zip(range(50), handle, strict=False)]
-    for number, line in enumerate(head):
-        text = line.strip()
-        if not text or (text.startswith("#") and not _has_axes(text.lstrip("# "))):
-            continue
-        separator = next((s for s in ";,\t" if s in text), None)
-        if re.fullmatch(r"\d+", text):  # .pts files begin with the number of points
-            continue
-        words = _split(text.lstrip("/# "), separator)
-        if _all_numbers(words):
-            _at_least_three(path, words)
-            names = ["X", "Y", "Z", *(f"column_{k}" for k in range(4, len(words) + 1))]
-            return number, names, separator or r"\s+"
-        if not _has_axes(text.lstrip("/# ")):
-            raise _damaged(path, f"the columns '{text[:80]}'")
-        following = next((row.strip() for row in head[number + 1 :] if row.strip()), "")
-        separator = next(
-            (s for s in ";,\t" if s in following), separator if not following else None
-        )
-        return number + 1, words, separator or r"\s+"
-    return 0, ["X", "Y", "Z"], r"\s+"
+def _without_counts(table: pd.DataFrame) -> tuple[pd.DataFrame, np.ndarray | None]:
+    """Rows that are points, and the scan of each where lines of counts divide them."""
+    if len(table.columns) < 2 or not len(table):
+        return table, None
+    alone = table.iloc[:, 1:].isna().all(axis=1).to_numpy()
+    rows = np.flatnonzero(alone)
+    if not len(rows):
+        return table, None
+    announced = pd.to_numeric(table.iloc[rows, 0], errors="coerce").to_numpy()
+    follow = np.diff(rows, append=len(table)) - 1
+    if not np.array_equal(announced, follow):
+        return table, None  # points that lack coordinates, and not counts
+    scan = np.cumsum(alone) + (rows[0] > 0)
+    return table[~alone], scan[~alone].astype(np.uint16)
 
 
-def _split(text: str, separator: str | None) -> list[str]:
-    return [word.strip().strip('"') for word in text.split(separator)]
+def _axes(path: Path, layout: Layout) -> tuple[list[str], np.ndarray, bool]:
+    """Names of the columns of x, y and z, metres of their units, and whether they are degrees."""
+    order: list[str] = []
+    found = [text_layout.axis(name) for name in layout.names]
+    factor, degrees = np.ones(3), False
+    for axis in range(3):
+        at = next(k for k, one in enumerate(found) if one is not None and one.axis == axis)
+        order.append(layout.names[at])
+        factor[axis], degrees = found[at].metres, degrees or found[at].degrees
+    return order, factor, degrees
 
 
-def _has_axes(text: str) -> bool:
-    found = {AXES.get(word.strip('"').lower()) for word in re.split(r"[\s,;]+", text)}
-    return {0, 1, 2} <= found
-
-
-def _all_numbers(words: list[str]) -> bool:
-    try:
-        [float(word) for word in words if word]
-    except ValueError:
-        return False
-    return True
-
-
-def _at_least_three(path: Path, words: list[str]) -> None:
-    if len(words) < 3:
-        raise _damaged(path, f"{len(words)} columns")
-
-
-def _name_the_bad_cell(path: Path, column: pd.Series, skip: int) -> None:
+def _numbers(path: Path, column: pd.Series, layout: Layout) -> np.ndarray:
+    if column.dtype.kind in "iufb":
+        return column.to_numpy(float)
     numbers = pd.to_numeric(column, errors="coerce")
-    bad = numbers.isna() & column.notna()
-    row = int(np.flatnonzero(bad)[0]) if bad.any() else 0
-    raise _damaged(path, f"'{column.iloc[row]}' in column {column.name}, data row {row + 1}")
+    bad = np.flatnonzero((numbers.isna() & column.notna()).to_numpy())
+    if len(bad):
+        row = int(bad[0])
+        cell = str(column.iloc[row])[:40]
+        raise wrong(path, f"'{cell}' in column {column.name}, data row {row + 1}")
+    return numbers.to_numpy(float)
 
 
-def _damaged(path: Path, found: str) -> InputError:
+def _attribute(column: pd.Series, name: str, notes: list[str]) -> np.ndarray | None:
+    """Numbers of a column that is not a coordinate; None where it is text or empty."""
+    if column.isna().all():
+        return None
+    if column.dtype.kind in "iufb":
+        return column.to_numpy()
+    numbers = pd.to_numeric(column, errors="coerce")
+    bad = np.flatnonzero((numbers.isna() & column.notna()).to_numpy())
+    if not len(bad):
+        return numbers.to_numpy()
+    cell = re.sub(r"\s+", " ", str(column.iloc[bad[0]]))[:30]
+    notes.append(f"Column {name} is left out: '{cell}' in data row {bad[0] + 1} is no number.")
+    return None
+
+
+def wrong(path: Path, found: str) -> InputError:
+    """The error of a text that is no table of points."""
     return InputError(
         path,
         found,

@@ -1,6 +1,6 @@
 """Point clouds in the local frame: read and write, with their origin and attributes."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -9,7 +9,8 @@ import numpy as np
 from dapple import frames
 from dapple.errors import EmptyCloudError, InputError
 from dapple.formats import cloud_e57, cloud_las, cloud_ply, cloud_ptx, cloud_text
-from dapple.formats.cloud_raw import RawCloud
+from dapple.formats.cloud_raw import RawCloud, Source
+from dapple.formats.ordered_scan import OrderedScan
 
 LEAF, WOOD = 4, 0
 """ASPRS-like class codes: 4 leaf, 0 wood."""
@@ -21,6 +22,7 @@ READERS = {
     ".ptx": cloud_ptx.read,
     **dict.fromkeys((".txt", ".xyz", ".csv", ".asc", ".pts"), cloud_text.read),
 }
+ORDERED = {".ptx": cloud_ptx.scans, ".e57": cloud_e57.scans}
 WRITERS = {
     **dict.fromkeys((".las", ".laz"), cloud_las.write),
     ".ply": cloud_ply.write,
@@ -62,6 +64,11 @@ class Cloud:
 
 
 def read(path: str | Path) -> Cloud:
+    """Read a cloud; `read_with_source` also tells what its file says of itself."""
+    return read_with_source(path)[0]
+
+
+def read_with_source(path: str | Path) -> tuple[Cloud, Source]:
     """Read a cloud; the suffix names the format.
 
     Parameters
@@ -72,22 +79,25 @@ def read(path: str | Path) -> Cloud:
 
     Returns
     -------
-    Cloud
+    cloud : Cloud
         In the local frame. The origin is the one in the file (LAS offset, PLY comment); where
         there is none, `frames.choose_origin` finds one if float32 would be too coarse.
+    source : Source
+        Coordinate system, units and scans as the file has them, and what of it was not taken.
 
     Raises
     ------
     EmptyCloudError
         No point.
     InputError
-        No such file, unknown suffix, damaged file, coordinates that are not finite or that have
-        already lost their millimetres.
+        No such file, unknown suffix, a file that is incomplete or contradicts itself, coordinates
+        that are not finite or that have already lost their millimetres.
     """
     path = Path(path)
     reader = _by_suffix(path, READERS, "read")
     _exists(path)
-    return _to_cloud(path, reader(path))
+    raw = reader(path)
+    return _to_cloud(path, raw), raw.source
 
 
 def iterate(path: str | Path, chunk: int = 1_000_000) -> Iterator[Cloud]:
@@ -120,17 +130,22 @@ def write(path: str | Path, cloud: Cloud, **options) -> None:
     writer(path, RawCloud(cloud.xyz_m, cloud.origin_m, cloud.attributes), **options)
 
 
-def require(cloud: Cloud, name: str, path: str | Path) -> np.ndarray:
-    """The values of an attribute, or an error that lists those that there are."""
+def require(cloud: Cloud, name: str, path: str | Path, notes: Iterable[str] = ()) -> np.ndarray:
+    """The values of an attribute, or an error that lists those that there are.
+
+    Of the notes of a reader those on the attribute are part of the message.
+    """
     if name in cloud.attributes:
         return cloud.attributes[name]
     there = ", ".join(sorted(cloud.attributes)) or "none"
+    said = "".join(f"{note} " for note in notes if name in note)
     raise InputError(
         path,
         f"no attribute '{name}' (there are: {there})",
         f"'{name}' with every point",
-        f"Export '{name}' from the scanner's software as an extra dimension, rename the column "
-        "that holds it, or choose a method that does without.",
+        f"{said}Export '{name}' from the scanner's software as an extra dimension, rename the "
+        "column that holds it, or choose a method that does without it "
+        "(classify: {method: geometry}).",
     )
 
 
@@ -139,10 +154,17 @@ def scan_positions(path: str | Path) -> np.ndarray | None:
 
     None for formats that do not keep them. Scan number k (`PointSourceId`, from 1) is row k - 1.
     """
+    scans = read_with_source(path)[1].scans
+    known = [scan.position_m for scan in scans if scan.position_m is not None]
+    return np.array(known) if known and len(known) == len(scans) else None
+
+
+def ordered_scans(path: str | Path) -> Iterator[tuple[int, OrderedScan]]:
+    """Number and content of every ordered scan of a PTX or E57 file, one in memory at a time."""
     path = Path(path)
+    reader = _by_suffix(path, ORDERED, "read as ordered scans")
     _exists(path)
-    module = {".e57": cloud_e57, ".ptx": cloud_ptx}.get(path.suffix.lower())
-    return None if module is None else module.scan_positions(path)
+    yield from reader(path)
 
 
 def _by_suffix(path: Path, table: dict, action: str):

@@ -5,18 +5,9 @@ from pathlib import Path
 import numpy as np
 
 from dapple.errors import InputError
+from dapple.formats import ply_elements
 from dapple.formats.atomic import atomic
 
-_TYPES = {
-    **dict.fromkeys(("char", "int8"), "i1"),
-    **dict.fromkeys(("uchar", "uint8"), "u1"),
-    **dict.fromkeys(("short", "int16"), "<i2"),
-    **dict.fromkeys(("ushort", "uint16"), "<u2"),
-    **dict.fromkeys(("int", "int32"), "<i4"),
-    **dict.fromkeys(("uint", "uint32"), "<u4"),
-    **dict.fromkeys(("float", "float32"), "<f4"),
-    **dict.fromkeys(("double", "float64"), "<f8"),
-}
 _FACE = np.dtype([("n", "u1"), ("vertex_indices", "<i4", 3), ("element", "<i4")])
 _EXPECTED = "a binary little-endian PLY with vertices and triangles"
 _REMEDY = "Write the mesh again, or convert it (CloudCompare: -M_EXPORT_FMT PLY)."
@@ -52,65 +43,30 @@ def read(path: str | Path) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarr
     path = Path(path)
     if not path.is_file():
         raise InputError(path, "no file", _EXPECTED, "Check the path.")
-    data = path.read_bytes()
-    head, mark, body = data.partition(b"end_header\n")
-    lines = head.decode("ascii", "replace").split("\n")
-    if lines[0].strip() != "ply" or not mark:
-        raise InputError(path, "no PLY header", _EXPECTED, _REMEDY)
-    layout, origin = _layout(path, lines[1:])
-    tables, at = {}, 0
-    for name, size, dtype in layout:
-        if at + size * dtype.itemsize > len(body):
-            raise InputError(
-                path,
-                f"{len(body)} bytes after the header, too few for its {size} × {name}",
-                _EXPECTED,
-                "The file is truncated: copy or make it again.",
-            )
-        tables[name] = np.frombuffer(body, dtype, size, at)
-        at += size * dtype.itemsize
+    size = path.stat().st_size
+    with path.open("rb") as handle:
+        header = ply_elements.read_header(path, handle)
+        if header.form != "<":
+            kind = "binary_big_endian" if header.form else "ascii"
+            raise InputError(path, f"PLY of the kind {kind}", _EXPECTED, _REMEDY)
+        tables = {
+            element.name: ply_elements.read(path, handle, header.form, element, size)
+            for element in header.elements
+        }
+    origin = np.zeros(3) if header.origin is None else header.origin
     return *_mesh(path, tables), origin
-
-
-def _layout(path: Path, lines: list[str]) -> tuple[list[tuple[str, int, np.dtype]], np.ndarray]:
-    """What the header says is in the file: tables in order, and the origin."""
-    tables: list[tuple[str, int, list]] = []
-    origin = np.zeros(3)
-    for line in lines:
-        words = line.split()
-        try:
-            match words:
-                case ["format", kind, _] if kind != "binary_little_endian":
-                    raise InputError(path, f"PLY of the kind {kind}", _EXPECTED, _REMEDY)
-                case ["comment", "origin_m", *values]:
-                    origin = np.array([float(value) for value in values])
-                case ["element", name, size]:
-                    tables.append((name, int(size), []))
-                case ["property", "list", count, item, name]:
-                    # Lists of one known length are tables; the length is checked afterwards.
-                    tables[-1][2].append((f"{name}_n", _TYPES[count]))
-                    tables[-1][2].append((name, _TYPES[item], 3))
-                case ["property", kind, name]:
-                    tables[-1][2].append((name, _TYPES[kind]))
-        except (KeyError, IndexError, ValueError) as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(path, f"the header line `{line}`", _EXPECTED, _REMEDY) from error
-    return [(name, size, np.dtype(fields)) for name, size, fields in tables], origin
 
 
 def _mesh(path: Path, tables: dict) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pick vertices, faces and elements from the tables and check that they belong together."""
-    vertex, face = tables.get("vertex"), tables.get("face")
-    fields = face.dtype.names if face is not None else ()
-    corners = next((name for name in fields or () if name.startswith("vertex_ind")), None)
-    if vertex is None or corners is None or not {"x", "y", "z"} <= set(vertex.dtype.names or ()):
+    vertex, face = tables.get("vertex", {}), tables.get("face", {})
+    corners = next((name for name in face if name.startswith("vertex_ind")), None)
+    if not {"x", "y", "z"} <= set(vertex) or "face" not in tables:
         raise InputError(path, "no vertices or no faces", _EXPECTED, _REMEDY)
-    if len(face) and not (face[corners.removesuffix("_n") + "_n"] == 3).all():
+    if corners is None or (len(face[corners]) and face[corners].shape[1] != 3):
         raise InputError(path, "faces that are not triangles", _EXPECTED, _REMEDY)
-    corners = corners.removesuffix("_n")
     vertices = np.stack([vertex[axis].astype(np.float64) for axis in "xyz"], axis=1)
-    faces = face[corners].astype(np.int32)
+    faces = face[corners].astype(np.int32).reshape(-1, 3)
     if len(faces) and (faces.min() < 0 or faces.max() >= len(vertices)):
         raise InputError(
             path,
@@ -118,6 +74,5 @@ def _mesh(path: Path, tables: dict) -> tuple[np.ndarray, np.ndarray, np.ndarray]
             f"vertices 0 to {len(vertices) - 1}",
             _REMEDY,
         )
-    has_element = "element" in face.dtype.names
-    element = face["element"].astype(np.int32) if has_element else np.arange(len(face))
+    element = face.get("element", np.arange(len(faces)))
     return vertices, faces, element.astype(np.int32)

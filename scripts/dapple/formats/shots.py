@@ -126,8 +126,12 @@ def to_cloud(shots: Shots) -> Cloud:
 
 def write(path: str | Path, shots: Shots, facts: dict | None = None) -> None:
     """Write shots to one Parquet file; see `write_chunks`."""
-    starts = range(0, len(shots), ROW_GROUP_SHOTS)
-    write_chunks(path, (part(shots, at, at + ROW_GROUP_SHOTS) for at in starts), facts)
+    write_chunks(path, parts(shots), facts)
+
+
+def parts(shots: Shots, most: int = ROW_GROUP_SHOTS) -> Iterator[Shots]:
+    """Shots in pieces of at most `most`, sharing memory with the whole."""
+    return (part(shots, at, at + most) for at in range(0, len(shots), most))
 
 
 def part(shots: Shots, start: int, stop: int) -> Shots:
@@ -162,7 +166,7 @@ def write_chunks(path: str | Path, chunks: Iterable[Shots], facts: dict | None =
     chunks : iterable of Shots
         Taken one at a time.
     facts : dict, optional
-        What a reader may want to know, such as the scanner's settings.
+        What a reader may want to know, such as the scanner's settings; read after the last chunk.
 
     Returns
     -------

@@ -97,6 +97,19 @@ def write_las(path: str | Path, offset_m, scale_m: float = 1e-4) -> dict:
     }
 
 
+def uncompress(laz: str | Path, las: str | Path, program: str = "pdal") -> None:
+    """Write a LAZ file, of whatever age, as LAS with every extra dimension.
+
+    Raises
+    ------
+    ProgramError
+        PDAL cannot read it.
+    """
+    reader = {"type": "readers.las", "filename": str(laz)}
+    writer = {"type": "writers.las", "filename": str(las), "forward": "all", "extra_dims": "all"}
+    run([reader, writer], program)
+
+
 def run(stages: list[dict | str], program: str = "pdal") -> Result:
     """Run a pipeline.
 

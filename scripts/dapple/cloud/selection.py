@@ -1,0 +1,162 @@
+"""What of a cloud is taken: in metres, without noise, and with attributes that can be kept."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from dapple.errors import EmptyCloudError, InputError
+from dapple.formats.cloud_raw import KNOWN_NAMES, Source
+from dapple.formats.clouds import Cloud
+
+NOISE_CLASSES = (7, 18)
+"""ASPRS: low and high noise."""
+
+NOISE = "classified as noise"
+FLAGS = {"Withheld": "withheld", "Synthetic": "synthetic"}
+KEPT = {*KNOWN_NAMES, "TrueClass"}
+LIMITS = {"ReturnNumber": 15, "NumberOfReturns": 15, "Classification": 255, "UserData": 255}
+WHOLE = {*LIMITS, "Intensity", "PointSourceId"}
+"""Attributes that LAS holds as whole numbers, up to 65,535 where LIMITS has no less."""
+
+
+def take(cloud: Cloud, source: Source, path: str | Path) -> tuple[Cloud, Source]:
+    """The points of a file that the chain works on.
+
+    Points that the file itself calls noise, withheld or synthetic are left out. Coordinates in
+    feet become metres. Attributes that mean nothing to the chain, or whose values cannot be kept,
+    are left out as well: they never stop a run.
+
+    Parameters
+    ----------
+    cloud : Cloud
+        As read, in the units of its file.
+    source : Source
+        What the file says of itself.
+    path : str or Path
+        To name in errors.
+
+    Returns
+    -------
+    cloud : Cloud
+        In metres.
+    source : Source
+        With counts and notes of what was left out and changed.
+
+    Raises
+    ------
+    InputError
+        Coordinates are in degrees.
+    EmptyCloudError
+        Nothing but noise.
+    """
+    cloud, source = in_metres(cloud, source, path)
+    cloud, left_out = without_marked(cloud, path)
+    attributes, notes = storable(cloud.attributes)
+    return (
+        Cloud(cloud.xyz_m, cloud.origin_m, attributes),
+        replace(
+            source,
+            left_out={**source.left_out, **left_out},
+            notes=(*source.notes, *notes),
+        ),
+    )
+
+
+def in_metres(cloud: Cloud, source: Source, path: str | Path) -> tuple[Cloud, Source]:
+    """Coordinates in metres, with a note where they were in another unit.
+
+    Raises
+    ------
+    InputError
+        They are in degrees: a degree of longitude is no fixed length.
+    """
+    units = source.units
+    if units.degrees:
+        low, high = cloud.world_xyz_m.min(axis=0), cloud.world_xyz_m.max(axis=0)
+        raise InputError(
+            path,
+            f"longitudes and latitudes ({low[0]:.5f} to {high[0]:.5f}, {low[1]:.5f} to "
+            f"{high[1]:.5f})",
+            "a projected coordinate system in metres",
+            f"Reproject the cloud, for example with `pdal translate in.laz out.laz reprojection "
+            f"--filters.reprojection.out_srs=EPSG:{_utm_zone(low[0], low[1])}`.",
+        )
+    factor = np.array([units.horizontal_m, units.horizontal_m, units.vertical_m])
+    if (factor == 1.0).all():
+        return cloud, source
+    note = (
+        f"Coordinates are in units of {factor[0]:.6g} m, heights of {factor[2]:.6g} m: turned into "
+        "metres."
+    )
+    step = None if source.step is None else source.step * factor[0]
+    scans = tuple(
+        replace(s, position_m=None if s.position_m is None else s.position_m * factor)
+        for s in source.scans
+    )
+    changed = Cloud(cloud.xyz_m * factor, cloud.origin_m * factor, cloud.attributes)
+    return changed, replace(source, step=step, scans=scans, notes=(*source.notes, note))
+
+
+def without_marked(cloud: Cloud, path: str | Path) -> tuple[Cloud, dict[str, int]]:
+    """Without points that the file calls noise, withheld or synthetic; how many of each.
+
+    Raises
+    ------
+    EmptyCloudError
+        Nothing is left.
+    """
+    marked = {}
+    if "Classification" in cloud.attributes:
+        marked[NOISE] = np.isin(cloud.attributes["Classification"], NOISE_CLASSES)
+    for name, reason in FLAGS.items():
+        if name in cloud.attributes:
+            marked[reason] = cloud.attributes[name] > 0
+    if not marked:
+        return cloud, {}
+    dropped = np.any(list(marked.values()), axis=0)
+    counts = {reason: int(mask.sum()) for reason, mask in marked.items() if mask.any()}
+    if dropped.all():
+        said = ", ".join(f"{n:,} {reason}" for reason, n in counts.items())
+        raise EmptyCloudError(
+            path,
+            f"noise alone ({said})",
+            "points of ground and plants",
+            "Check classes and flags of the export.",
+        )
+    kept = cloud.select(~dropped) if dropped.any() else cloud
+    attributes = {n: v for n, v in kept.attributes.items() if n not in FLAGS}
+    return Cloud(kept.xyz_m, kept.origin_m, attributes), counts
+
+
+def storable(attributes: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], list[str]]:
+    """Attributes that the chain may use and LAS can hold, and notes on the others."""
+    kept, notes = {}, []
+    for name, values in attributes.items():
+        if name not in KEPT:
+            continue
+        if name in WHOLE:
+            limit = LIMITS.get(name, 65535)
+            wrong = ~((values >= 0) & (values <= limit) & (values == np.rint(values)))
+            if wrong.any():
+                notes.append(
+                    f"{name} is left out: {values[wrong][0]} is no whole number from 0 to {limit}."
+                )
+                continue
+            values = values.astype(np.uint16 if limit == 65535 else np.uint8)
+        kept[name] = values
+    return kept, notes
+
+
+def duplicates(xyz_m: np.ndarray) -> np.ndarray:
+    """(n,) True for points at exactly the place of one before them."""
+    order = np.lexsort(xyz_m.T)
+    ordered = xyz_m[order]
+    again = np.zeros(len(xyz_m), bool)
+    again[order[1:]] = (ordered[1:] == ordered[:-1]).all(axis=1)
+    return again
+
+
+def _utm_zone(longitude: float, latitude: float) -> int:
+    zone = int((longitude + 180.0) // 6) % 60 + 1
+    return (32600 if latitude >= 0 else 32700) + zone

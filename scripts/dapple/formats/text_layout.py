@@ -1,0 +1,221 @@
+"""How a text table of points is laid out: encoding, header, separator, decimal sign, units."""
+
+import re
+from dataclasses import dataclass, replace
+from itertools import islice
+from pathlib import Path
+
+from dapple.errors import InputError
+
+HEAD_LINES = 200
+LONGEST_LINE = 1 << 16
+NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?|[-+]?(nan|inf)", re.IGNORECASE)
+MARKS = "/#%!;\"' \t"
+"""Signs before a header that other programs take for a comment."""
+
+AXES = (
+    {
+        "x",
+        "easting",
+        "east",
+        "e",
+        "xcoordinate",
+        "coordx",
+        "utmx",
+        "rechtswert",
+        "longitude",
+        "lon",
+    },
+    {"y", "northing", "north", "n", "ycoordinate", "coordy", "utmy", "hochwert", "latitude", "lat"},
+    {"z", "height", "elevation", "altitude", "zcoordinate", "coordz", "utmz", "hoehe", "h"},
+)
+DEGREES = {"longitude", "lon", "latitude", "lat"}
+UNITS = {
+    "": 1.0,
+    "m": 1.0,
+    "metre": 1.0,
+    "meter": 1.0,
+    "cm": 0.01,
+    "mm": 0.001,
+    "ft": 0.3048,
+    "feet": 0.3048,
+    "usft": 1200 / 3937,
+    "ussurveyfoot": 1200 / 3937,
+}
+
+
+@dataclass(frozen=True)
+class Axis:
+    """What the name of a column says: x, y or z (0 to 2), metres of its unit, or degrees."""
+
+    axis: int
+    metres: float = 1.0
+    degrees: bool = False
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How to read a table.
+
+    Attributes
+    ----------
+    skip : int
+        Lines before the first row of numbers.
+    names : tuple of str
+        Of the columns, none of them twice.
+    separator : str
+        As pandas takes it.
+    decimal : str
+        "." or ",".
+    encoding : str
+    width : int
+        Fields of the first row.
+    header : tuple of str or None
+        The names as the file has them.
+    """
+
+    skip: int
+    names: tuple[str, ...]
+    separator: str
+    decimal: str
+    encoding: str
+    width: int
+    header: tuple[str, ...] | None
+
+    def named(self, names: tuple[str, ...]) -> "Layout":
+        """The same with other names of columns."""
+        return replace(self, names=names)
+
+
+def find(path: Path) -> Layout | None:
+    """Look at the first lines of a file; None where it has no row of numbers.
+
+    Raises
+    ------
+    InputError
+        There is a header without x, y and z, or no table at all.
+    """
+    encoding = _encoding(path)
+    with path.open(encoding=encoding, errors="replace") as handle:
+        lines = list(islice(iter(lambda: handle.readline(LONGEST_LINE), ""), HEAD_LINES))
+    for number, line in enumerate(lines):
+        if line.lstrip().startswith("#"):
+            continue
+        if fields := _fields(line):
+            separator, decimal, words = fields
+            names, header = _names(path, lines[:number], separator, words)
+            return Layout(number, names, separator, decimal, encoding, len(words), header)
+    words = [word for line in lines[-3:] for word in line.split()]
+    if any(_has_axes(line) for line in lines) or not words:
+        return None
+    raise _no_table(path, "no row of numbers: '" + " ".join(words)[:80] + "'")
+
+
+def axis(name: str) -> Axis | None:
+    """The axis that a column is, if it is one: `X[mm]` is x in millimetres."""
+    text = name.strip().strip('"').lstrip("/# ").lower()
+    unit = ""
+    if bracket := re.search(r"[\[(]([^\])]*)[\])]\s*$", text):
+        unit, text = re.sub(r"[^a-z°]", "", bracket[1]), text[: bracket.start()]
+    elif suffix := re.fullmatch(r"(.*)_(m|cm|mm|ft|feet)", text.strip()):
+        text, unit = suffix[1], suffix[2]
+    letters = re.sub(r"[^a-zö]", "", text).replace("ö", "oe")
+    for number, known in enumerate(AXES):
+        if letters in known:
+            degrees = letters in DEGREES or unit in ("deg", "degree", "degrees", "°")
+            return Axis(number, UNITS.get(unit, 1.0), degrees)
+    return None
+
+
+def _encoding(path: Path) -> str:
+    with path.open("rb") as handle:
+        head = handle.read(1 << 16)
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf-16"
+    if head.startswith(b"\xef\xbb\xbf"):
+        return "utf-8-sig"
+    try:
+        head[: len(head) - 4].decode("utf-8")
+    except UnicodeDecodeError:
+        return "latin-1"
+    return "utf-8"
+
+
+def _fields(line: str) -> tuple[str, str, list[str]] | None:
+    """Separator, decimal sign and fields of a row of three numbers or more; None of another."""
+    text = line.strip()
+    if not text or re.fullmatch(r"\d+", text):  # the number of points that follow
+        return None
+    for separator in (";", "\t", r"\s+", ","):
+        words = _split(text, separator)
+        if len(words) < 3 or not all(NUMBER.fullmatch(word) for word in words[:3]):
+            continue
+        comma = separator != "," and any("," in word for word in words[:3])
+        if comma and any("." in word for word in words[:3]):
+            continue
+        return separator, "," if comma else ".", words
+    return None
+
+
+def _split(text: str, separator: str) -> list[str]:
+    words = text.split() if separator == r"\s+" else text.split(separator)
+    words = [word.strip().strip('"') for word in words]
+    return words
+
+
+def _names(
+    path: Path, before: list[str], separator: str, words: list[str]
+) -> tuple[tuple[str, ...], tuple[str, ...] | None]:
+    """Names of the columns: those of a header among the lines before the first row, or numbers."""
+    width = len(words)
+    for line in reversed(before):
+        text = line.strip().lstrip(MARKS)
+        if not text or re.fullmatch(r"\d+", text):
+            continue
+        if _has_axes(text):
+            names = _header_words(text, separator, width)
+            return _unique(names, width, words), names
+        fields = _split(text, separator)
+        if len(fields) == width and not line.lstrip().startswith(tuple(MARKS[:4])):
+            raise _no_table(path, f"the columns '{text[:80]}'")
+    return ("X", "Y", "Z", *(f"column_{k}" for k in range(4, width + 1))), None
+
+
+def _header_words(text: str, separator: str, width: int) -> tuple[str, ...]:
+    """Names of a header, which may be separated in another way than the rows."""
+    options = [tuple(_split(text, one)) for one in (separator, ";", ",", "\t", r"\s+")]
+    options = [words for words in options if _axes_of(words) == {0, 1, 2}]
+    # The way that gives as many names as there are fields, else the first that has the axes.
+    return next((words for words in options if len(words) == width), options[0])
+
+
+def _unique(names: tuple[str, ...], width: int, words: list[str]) -> tuple[str, ...]:
+    found: list[str] = []
+    for number, name in enumerate(names, 1):
+        name = name or f"column_{number}"
+        while name in found:
+            name += "_"
+        found.append(name)
+    if width == len(found) + 1 and not words[-1]:  # a separator at the end of every row
+        found.append("nothing")
+    return tuple(found)
+
+
+def _axes_of(words) -> set[int]:
+    return {found.axis for word in words if (found := axis(word)) is not None}
+
+
+def _has_axes(text: str) -> bool:
+    return any(
+        _axes_of(re.split(pattern, text.strip().lstrip(MARKS))) == {0, 1, 2}
+        for pattern in (r"[\s,;]+", r"[,;\t]")
+    )
+
+
+def _no_table(path: Path, found: str) -> InputError:
+    return InputError(
+        path,
+        found,
+        "a table of numbers with columns X Y Z (header optional; further columns need one)",
+        "Correct the line, or export again with a header such as 'X Y Z Reflectance'.",
+    )
