@@ -24,7 +24,7 @@ from dapple.scene import patterns, traced
 from dapple.scene.surfaces import Optics, Scene
 
 CELL_M = np.array([[-50.0, -50.0], [50.0, 50.0]])
-SUN_ZENITH_DEG, SUN_AZIMUTH_DEG = 20.0, 0.0
+SUN_ZENITH_DEG, SUN_AZIMUTH_DEG = 20.0, 90.0
 OPTICS = Optics(
     wavelength_nm=np.array([0.0, 850.0]),
     leaf_reflectance=np.array([0.0, 0.4957]),

@@ -8,7 +8,7 @@ from dapple.errors import InputError, MissingMissesError
 from dapple.formats import voxel_grids as files
 from dapple.formats.meshes import Mesh
 from dapple.formats.shots import Shots
-from dapple.structure import summary
+from dapple.structure import leaf_angles, summary
 from dapple.structure.returns import kinds_by_place
 from dapple.structure.voxels import Grid, accumulate, estimate, plant_area_density
 
@@ -228,13 +228,65 @@ def test_a_turbid_cube_has_the_density_it_was_made_of(distribution):
         assert np.average(density, weights=weight) == pytest.approx(0.6, rel=0.02), name
 
 
-def test_the_finite_element_correction_lowers_the_density():
-    plain = plant_area_density(TWO_SHOTS, column(1), min_shots=1)
-    large = plant_area_density(TWO_SHOTS, column(1), min_shots=1, single_leaf_area_m2=0.4)
+def leaves_by_chance(distribution, beam_zenith, n_leaves, area_m2, n_shots, rng):
+    """Shots through a cubic metre in which a few round leaves lie anew for every shot.
+
+    Leaves reach over the sides and come in at the others, so that every place is alike.
+    """
+    direction = np.array([np.sin(beam_zenith), 0.0, np.cos(beam_zenith)])
+    shape = (n_shots, n_leaves)
+    angle = (np.arange(2000) + 0.5) * np.pi / 4000
+    cumulative = np.cumsum(leaf_angles.density(distribution, angle)) * np.pi / 4000
+    tilt, turn = np.interp(rng.random(shape), cumulative, angle), 2 * np.pi * rng.random(shape)
+    normal = np.stack([np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)], -1)
+    centre, origin = rng.random((*shape, 3)), rng.random((n_shots, 3)) - 2 * direction
+    with np.errstate(divide="ignore"):
+        sides = (np.array([[0.0], [1.0]])[..., None] - origin) / direction
+    enters, leaves = sides.min(axis=0).max(axis=1), sides.max(axis=0).min(axis=1)
+    first = np.full(n_shots, np.inf)
+    for image in np.stack(np.meshgrid(*[[-1, 0, 1]] * 3), -1).reshape(-1, 3):
+        away = centre + image - origin[:, None]
+        at = (away * normal).sum(axis=-1) / (normal @ direction)
+        off = ((at[..., None] * direction - away) ** 2).sum(axis=-1)
+        met = (off <= area_m2 / np.pi) & (at >= enters[:, None]) & (at < leaves[:, None])
+        first = np.minimum(first, np.where(met, at, np.inf).min(axis=1))
+    ranges = [[r] if np.isfinite(r) else [] for r in first]
+    return shots_of(origin, direction, ranges)
+
+
+@pytest.mark.parametrize(
+    ("distribution", "beam_zenith_deg"), [("spherical", 30), ("planophile", 0), ("erectophile", 0)]
+)
+def test_few_large_leaves_have_their_density_with_their_own_area_alone(
+    distribution, beam_zenith_deg
+):
+    """Seven leaves of 0.3 m² in a cubic metre, G from 0.42 to 0.85; half or twice the area errs."""
+    rng = np.random.default_rng(8)
+    shots = leaves_by_chance(distribution, np.radians(beam_zenith_deg), 7, 0.3, 12_000, rng)
+
+    def density(area_m2):
+        options = {"leaf_angle_distribution": distribution, "single_leaf_area_m2": area_m2}
+        dataset = plant_area_density(shots, column(1), contact_voxel_m=0.0, **options)
+        return in_column(dataset, "pad_fpl_m2_m3")[0], in_column(dataset, "standard_error_m2_m3")[0]
+
+    found, error = density(0.3)
+    assert error < 0.02 * 2.1
+    assert found == pytest.approx(2.1, abs=2 * error)
+    assert density(0.15)[0] > 2.1 + 2 * error
+    assert density(0.6)[0] < 2.1 - 2 * error
+
+
+def test_half_of_amapvox_s_leaf_area_gives_amapvox_s_effective_path():
+    """It takes λ₁ = 0.25·area/V: given 0.4 m², 0.1 per metre."""
+    result = plant_area_density(TWO_SHOTS, column(1), min_shots=1, single_leaf_area_m2=0.4 / 2)
     z = -np.log(1 - 0.1 * np.array([0.5, 1.0])) / 0.1
     expected = (1 / 3) / (z[0] / 3 + z[1] * 2 / 3 + z[1])
-    assert 0.5 * in_column(large, "pad_fpl_biased_m2_m3")[0] == pytest.approx(expected)
-    assert in_column(large, "pad_fpl_m2_m3")[0] < in_column(plain, "pad_fpl_m2_m3")[0]
+    assert 0.5 * in_column(result, "pad_fpl_biased_m2_m3")[0] == pytest.approx(expected)
+
+
+def test_a_leaf_that_could_fill_a_voxel_is_refused():
+    with pytest.raises(InputError, match=r"single_leaf_area_m2.*larger voxels"):
+        plant_area_density(TWO_SHOTS, column(1), single_leaf_area_m2=1.2)
 
 
 def test_contact_frequency_counts_sub_voxels():

@@ -15,7 +15,11 @@ class Voxels(Section):
         "fpl", "bias-corrected free path length", "Pimont et al. 2018"
     )
     leaf_angle_distribution: LeafAngles = key("spherical", "of the leaf normals", FREY)
-    single_leaf_area_m2: NotNegative = key(0.0, "finite-element correction; 0: none")
+    single_leaf_area_m2: NotNegative = key(
+        0.0,
+        "one-sided, for the finite-element correction (half of AMAPVox's number); 0: none",
+        "Pimont et al. 2018",
+    )
     max_pad_m2_m3: Positive = key(5.0, "cap of plant area density", "AMAPVox")
     min_shots: Count = key(5, "fewer shots leave a voxel unknown", "AMAPVox")
     contact_voxel_m: NotNegative = key(

@@ -81,7 +81,13 @@ def _section(origin, corner, index, size, beam):
 
 @njit(cache=True)
 def _effective(length, lambda_1):
-    """Effective path of a medium of finite elements (Pimont et al. 2018)."""
+    """Path that a medium of infinitely small elements needs to dim a beam as much.
+
+    Pimont et al. (2018): one element of area s that may lie anywhere in a voxel of volume V, and
+    shows the beam G·s, leaves a path z free with the chance 1 - λ₁·z, λ₁ = G·s/V. N of them leave
+    it free with (1 - λ₁·z)ᴺ = exp(-N·λ₁·z_e), z_e = -ln(1 - λ₁·z)/λ₁: over z_e the attenuation is
+    N·λ₁ = G·PAD, as in a turbid medium.
+    """
     return length if lambda_1 == 0.0 else -math.log(1.0 - lambda_1 * length) / lambda_1
 
 
@@ -140,7 +146,7 @@ def _visit_parts(
 
 @njit(cache=True)
 def _march(
-    i, origin, direction, zenith, g, first, range_m, kind, corner, shape, size, beam, lambda_1,
+    i, origin, direction, zenith, g, first, range_m, kind, corner, shape, size, beam, element,
     u_max, n_parts, visits, hits, touched, hit, inverse, facet, fine, step, index, place, move,
 ):  # fmt: skip
     """Follow shot i until it leaves the grid or its last echo has taken the rest of the beam."""
@@ -170,7 +176,7 @@ def _march(
             t = 2.0 * g * chord / u_max - 1.0
             while j < end and range_m[j] < leave:
                 free, weight = max(range_m[j] - distance, 0.0), section * share
-                u = g * _effective(free, lambda_1)
+                u = g * _effective(free, g * element)
                 visits[voxel, FREE] += weight * u
                 if kind[j] == HIT:
                     hits[voxel, N_HITS] += 1.0
@@ -187,7 +193,7 @@ def _march(
             visits[voxel, ANGLE] += zenith
             if not is_over:
                 passing = section * (1.0 if is_miss else share * (end - j))
-                visits[voxel, FREE] += passing * g * _effective(chord, lambda_1)
+                visits[voxel, FREE] += passing * g * _effective(chord, g * element)
             if whole > 1e-12 * section:
                 _add_moments(visits, voxel, VISIT_MOMENTS, whole, t)
             if n_parts > 0:
@@ -212,7 +218,7 @@ def _march(
 
 @njit(cache=True, parallel=True)
 def accumulate(
-    origin, direction, zenith, g, first, range_m, kind, corner, shape, size, beam, lambda_1,
+    origin, direction, zenith, g, first, range_m, kind, corner, shape, size, beam, element,
     u_max, n_parts, visits, hits, touched, hit,
 ):  # fmt: skip
     """Add shots to the sums of the voxels that they cross.
@@ -234,8 +240,8 @@ def accumulate(
     size : float
     beam : (2,) float64
         tan(divergence / 2) and the diameter at exit [m]; a diameter of 0: unit beam.
-    lambda_1 : float
-        Attenuation by one element [m⁻¹], 0 for none.
+    element : float
+        One-sided area of an element over a voxel's volume [m⁻¹]; 0: infinitely small elements.
     u_max : float
         Longest optical path G·δ in a voxel [m]; moments are of t = 2·G·δ/u_max - 1.
     n_parts : int
@@ -254,6 +260,6 @@ def accumulate(
             for i in range(begin, min(begin + _SEGMENT, n_shots)):
                 _march(
                     i, origin, direction, zenith[i], g[i], first, range_m, kind, corner, shape,
-                    size, beam, lambda_1, u_max, n_parts, visits[block], hits[block], touched, hit,
+                    size, beam, element, u_max, n_parts, visits[block], hits[block], touched, hit,
                     inverse, facet, fine, step, index, place, move,
                 )  # fmt: skip

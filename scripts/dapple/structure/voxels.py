@@ -142,10 +142,13 @@ def accumulate(
     leaf_angle_distribution : str
         One of `leaf_angles.DISTRIBUTIONS`; G is taken at each shot's own angle.
     single_leaf_area_m2 : float
-        One-sided area of a leaf, for the finite-element correction of free paths (Pimont et al.
-        2018) in the estimators `fpl` and `fpl_biased`; 0, the default: no correction. It is the
-        mean element that a beam can tell from others: where leaves are folded or lie against
-        each other, no measured leaf area stands for it, hence the default.
+        One-sided area s of a leaf, for the finite-element correction of free paths in the
+        estimators `fpl` and `fpl_biased`; 0, the default: no correction. A path z counts as
+        -ln(1 - λ₁z)/λ₁ with λ₁ = G·s/V for a voxel of volume V (derived in
+        `traversal._effective`; Pimont et al. 2018). AMAPVox takes λ₁ = 0.25/V times the area that
+        it is given: half its number gives the same answer here with spherical leaf angles. The
+        area is that of the mean element that a beam can tell from others: where leaves are folded
+        or lie against each other, no measured leaf area stands for it, hence the default.
     max_pad_m2_m3 : float
         Cap of plant area density.
     contact_voxel_m : float
@@ -169,9 +172,11 @@ def accumulate(
         Every shot has a return: plant area density would have no denominator.
     InputError
         No shot, ranges that are not finite or not in ascending order, kinds of another length,
-        a direction that is no unit vector, or a cap too high for the voxel size.
+        a direction that is no unit vector, a cap too high for the voxel size, or a leaf that
+        could fill a voxel's section.
     """
     u_max = math.sqrt(3) * grid.size_m * _largest_projection(leaf_angle_distribution)
+    _check_leaf(single_leaf_area_m2, u_max, grid.size_m)
     count = estimators.n_moments(max_pad_m2_m3 * u_max)
     n_parts = max(1, round(grid.size_m / contact_voxel_m)) if contact_voxel_m > 0 else 0
     # A number of blocks that depends on the grid alone keeps sums the same on any machine.
@@ -198,7 +203,7 @@ def accumulate(
             np.array(grid.shape, np.int64),
             float(grid.size_m),
             beam,
-            0.25 * single_leaf_area_m2 / grid.size_m**3,
+            single_leaf_area_m2 / grid.size_m**3,
             u_max,
             n_parts,
             visits,
@@ -369,6 +374,18 @@ def _dataset(sums: Sums, variables: dict, estimator: str, min_shots: int) -> xr.
         **sums.settings,
     }
     return dataset
+
+
+def _check_leaf(single_leaf_area_m2: float, u_max: float, size_m: float) -> None:
+    """Refuse leaves of which one could darken a voxel: the correction has no answer there."""
+    largest = size_m**3 / u_max
+    if single_leaf_area_m2 >= largest:
+        raise InputError(
+            "voxels.single_leaf_area_m2",
+            f"{single_leaf_area_m2} m² in voxels of {size_m} m",
+            f"less than {largest:.2g} m²",
+            "Take larger voxels, or 0 for no finite-element correction.",
+        )
 
 
 def _largest_projection(distribution: str) -> float:
