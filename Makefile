@@ -26,6 +26,7 @@ format: setup
 
 docs: setup
 	PYTHONPATH=scripts $(BIN)/python -m dapple.config.docs
+	$(BIN)/python tools/pages.py
 
 lock: setup
 	$(BIN)/uv pip compile pyproject.toml --group dev --generate-hashes --universal --no-header --quiet -o requirements.lock

@@ -1,10 +1,11 @@
 """RAMI HET01: fifteen spheres of disc leaves, repeated sideways, in visible and infrared light.
 
-    PYTHONPATH=scripts python benchmarks/rami.py DATA OUTPUT [--paths N]
+    python benchmarks/rami.py DATA [--docs docs] [--paths N]
 
 DATA holds `het01_UNI_sphere.def` and `het01_UNI_instances.def` of the RAdiation transfer Model
-Intercomparison (JRC). Prints fluxes and the nadir gap fraction with their standard errors and
-writes the bidirectional reflectance factor in the principal plane to OUTPUT (CSV and PNG).
+Intercomparison (JRC). Writes fluxes, the nadir gap fraction and the bidirectional reflectance
+factor in the principal plane, with standard errors, to docs/data/rami_het01.csv,
+docs/data/rami_het01_brf.csv and docs/img/het01_brf.png.
 """
 
 import argparse
@@ -24,6 +25,7 @@ from dapple.scene import patterns, traced
 from dapple.scene.surfaces import Optics, Scene
 
 CELL_M = np.array([[-50.0, -50.0], [50.0, 50.0]])
+# RAMI counts azimuths from its x axis, along which this scene has its sun: our east.
 SUN_ZENITH_DEG, SUN_AZIMUTH_DEG = 20.0, 90.0
 OPTICS = Optics(
     wavelength_nm=np.array([0.0, 850.0]),
@@ -64,8 +66,8 @@ def gap_fraction(scene: traced.TracedScene, towards: np.ndarray, n: int = 1 << 1
     return np.mean(sets), np.std(sets, ddof=1) / 4
 
 
-def fluxes(scene: traced.TracedScene, sun: np.ndarray, n_paths: int) -> list[tuple]:
-    """Upward flux above the canopy and downward flux on the ground, as shares of the sun's."""
+def fluxes(scene: traced.TracedScene, sun: np.ndarray, n_paths: int) -> pd.DataFrame:
+    """Upward flux above the canopy, downward flux on the ground, as shares of the sun's; gaps."""
     settings = {"n_paths": n_paths, "max_orders": 250, "seed": 2}
     rows = []
     seen, seen_error = gap_fraction(scene, sun)
@@ -77,7 +79,7 @@ def fluxes(scene: traced.TracedScene, sun: np.ndarray, n_paths: int) -> list[tup
             rows.append((name, case, value + straight, np.hypot(error, straight_error)))
     rows.append(("straight on the ground", "both", seen, seen_error))
     rows.append(("gap fraction at nadir", "both", *gap_fraction(scene, np.array([0.0, 0.0, 1.0]))))
-    return rows
+    return pd.DataFrame(rows, columns=["quantity", "case", "value", "standard_error"])
 
 
 def principal_plane(scene: traced.TracedScene, sun: np.ndarray, n_paths: int) -> pd.DataFrame:
@@ -117,25 +119,23 @@ def draw(table: pd.DataFrame, path: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("data", type=Path)
-    parser.add_argument("output", type=Path)
+    parser.add_argument("--docs", type=Path, default=Path(__file__).parents[1] / "docs")
     parser.add_argument("--paths", type=int, default=280_000, help="paths of each view")
     parser.add_argument("--variant", default="llvm_ad_rgb")
     options = parser.parse_args()
-    clock = time.perf_counter()
     scene, index = load(options.data, options.variant)
-    print(f"leaf area index {index:.4f}, loaded in {time.perf_counter() - clock:.1f} s")
     sun = direction_from_angles(SUN_ZENITH_DEG, SUN_AZIMUTH_DEG)
-    for name, case, value, error in fluxes(scene, sun, 4 * options.paths):
-        print(f"{name:24} {case:14} {value:.5f} ± {error:.5f}", flush=True)
+    table = fluxes(scene, sun, 4 * options.paths)
+    table.loc[len(table)] = ("leaf area index", "both", index, 0.0)
     clock = time.perf_counter()
-    table = principal_plane(scene, sun, options.paths)
-    seconds = time.perf_counter() - clock
-    share = (table["standard_error_nir"] / table["brf_nir"]).max()
-    print(f"{len(table)} angles in {seconds:.0f} s, largest relative standard error {share:.2%}")
-    options.output.mkdir(parents=True, exist_ok=True)
-    table.to_csv(options.output / "het01_brf.csv", index=False, float_format="%.6f")
-    draw(table, options.output / "het01_brf.png")
-    print(table.iloc[:: len(table) // 12].to_string(index=False))
+    plane = principal_plane(scene, sun, options.paths)
+    table.loc[len(table)] = ("seconds of the plane", "both", time.perf_counter() - clock, 0.0)
+    share = (plane["standard_error_nir"] / plane["brf_nir"]).max()
+    table.loc[len(table)] = ("largest relative standard error", "near infrared", share, 0.0)
+    table.to_csv(options.docs / "data" / "rami_het01.csv", index=False, float_format="%.6f")
+    plane.to_csv(options.docs / "data" / "rami_het01_brf.csv", index=False, float_format="%.6f")
+    draw(plane, options.docs / "img" / "het01_brf.png")
+    print(table.to_string(index=False))
 
 
 if __name__ == "__main__":
