@@ -16,11 +16,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
 from dapple.config.settings import Settings
 from dapple.formats import json, rasters
-from dapple.formats.meshes import concatenate
 from dapple.frames import direction_from_angles
 from dapple.retrieval import coefficients, image_paths, maps, spectra, training_entries
 from dapple.scene import scene_files, traced
-from dapple.scene.surfaces import Scene
+from dapple.scene.surfaces import GROUND, LEAF, WOOD, Scene, Surface
 from dapple.virtual import plot_optics
 
 EDGE_M = 18.0
@@ -101,9 +100,8 @@ def truth(world, trees: pd.DataFrame):
 
 def all_leaf(scene: Scene) -> Scene:
     """The same facets, wood taken for leaf."""
-    meshes = scene.meshes
-    leaf = concatenate([meshes["leaf"], meshes["wood"]])
-    return Scene({"leaf": leaf, "ground": meshes["ground"]}, ground_z_m=scene.ground_z_m)
+    plants = [Surface(one.mesh) for one in (*scene.of(LEAF), *scene.of(WOOD))]
+    return Scene([*plants, *scene.of(GROUND)], ground_z_m=scene.ground_z_m)
 
 
 if __name__ == "__main__":

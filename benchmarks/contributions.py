@@ -20,7 +20,7 @@ from dapple.config.settings import Settings, validate
 from dapple.formats import json, meshes, tables
 from dapple.light import series, transport, visibility
 from dapple.scene import scene_optics, traced
-from dapple.scene.surfaces import Scene
+from dapple.scene.surfaces import Scene, of_kinds
 from dapple.sky.sky_radiance import sky_dataset
 from dapple.sky.sun import Site, broadband
 from dapple.stats import correlation, measured
@@ -123,7 +123,7 @@ class Run:
             sun_diameter_deg = self.settings.light.sun_diameter_deg
         result = []
         for number, one in enumerate(leaves):
-            scene = Scene({"leaf": one, "wood": self.wood}, None, self.settings.ground_z_m)
+            scene = Scene(of_kinds(leaf=one, wood=self.wood), None, self.settings.ground_z_m)
             loaded = traced.load(scene)
             seen = visibility.sunlit(
                 loaded, points_m, series.towards_sun(sky), tolerance=0.005, max_rays=4096,

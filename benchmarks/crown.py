@@ -6,7 +6,8 @@ import xarray as xr
 
 from dapple.formats.meshes import Mesh
 from dapple.formats.netcdf import time_coordinate
-from dapple.scene.surfaces import Optics, Scene
+from dapple.scene.scene_optics import Optics
+from dapple.scene.surfaces import Scene, of_kinds
 
 CENTRE_M, RADII_M = np.array([0.0, 0.0, 4.4]), np.array([3.8, 3.8, 2.3])
 LEAF_AREA_M2 = 187.0
@@ -65,8 +66,8 @@ def scene(kind: str, n_triangles: int = 350_000) -> Scene:
     """`polygons`, or `voxels_0.2` and the like."""
     mesh = leaves(n_triangles)
     if kind == "polygons":
-        return Scene({"leaf": mesh, "wood": stem()})
-    return Scene({"wood": stem()}, voxels(mesh, float(kind.removeprefix("voxels_"))))
+        return Scene(of_kinds(leaf=mesh, wood=stem()))
+    return Scene(of_kinds(wood=stem()), voxels(mesh, float(kind.removeprefix("voxels_"))))
 
 
 def sensors(n: int) -> np.ndarray:
@@ -82,7 +83,9 @@ def optics(n_bands: int = 61) -> Optics:
     wavelength = np.linspace(400, 700, n_bands)
     peak = np.exp(-(((wavelength - 550) / 40) ** 2))
     flat = np.ones(n_bands)
-    return Optics(wavelength, 0.05 + 0.08 * peak, 0.02 + 0.1 * peak, 0.2 * flat, 0.1 + 0.1 * peak)
+    return Optics.of_tree(
+        wavelength, 0.05 + 0.08 * peak, 0.02 + 0.1 * peak, 0.2 * flat, 0.1 + 0.1 * peak
+    )
 
 
 def sky(n_times: int = 306, n_bands: int = 61) -> xr.Dataset:

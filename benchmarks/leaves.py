@@ -21,7 +21,7 @@ from dapple.config.settings import validate
 from dapple.formats import json, meshes
 from dapple.registration import shading
 from dapple.scene import sensors
-from dapple.scene.surfaces import Scene
+from dapple.scene.surfaces import Scene, of_kinds
 from dapple.sky.sky_radiance import sky_dataset
 from dapple.sky.sun import Site, broadband
 from dapple.stats import measured
@@ -63,7 +63,7 @@ def main() -> None:
             along_wood(wood, **placing, seed=stream_seed(11, k)) for k in range(options.placements)
         ]
         found = shading.register(
-            [Scene({"leaf": one, "wood": wood}, None, settings.ground_z_m) for one in leaves],
+            [Scene(of_kinds(leaf=one, wood=wood), None, settings.ground_z_m) for one in leaves],
             table,
             records,
             sky_at=sky_at,

@@ -29,7 +29,7 @@ from dapple.formats import meshes, netcdf, voxel_grids
 from dapple.light import series, transport, visibility
 from dapple.light.timestep_series import Reference
 from dapple.scene import scene_files, scene_optics, traced
-from dapple.scene.surfaces import Scene
+from dapple.scene.surfaces import LEAF, WOOD, Scene
 
 KINDS = ("polygons", "voxels_0.2", "voxels_1.0")
 REFERENCE_RAYS = {
@@ -45,10 +45,10 @@ def prepare(folder: Path, kind: str, n_triangles: int, n_sensors: int, n_times: 
     """Write the inputs of one run."""
     scene = crown.scene(kind, n_triangles)
     if scene.voxels is None:
-        meshes.write_ply(folder / "leaves.ply", scene.meshes["leaf"])
+        meshes.write_ply(folder / "leaves.ply", scene.of(LEAF)[0].mesh)
     else:
         voxel_grids.write(folder / "leaves.nc", scene.voxels)
-    meshes.write_ply(folder / "wood.ply", scene.meshes["wood"])
+    meshes.write_ply(folder / "wood.ply", scene.of(WOOD)[0].mesh)
     netcdf.write(folder / "sky.nc", described(crown.sky(n_times)))
     scene_optics.write(folder / "optics.nc", crown.optics())
     np.save(folder / "sensors.npy", crown.sensors(n_sensors))

@@ -22,16 +22,17 @@ from dapple.formats import rami
 from dapple.frames import direction_from_angles
 from dapple.light import brf, visibility
 from dapple.scene import patterns, traced
-from dapple.scene.surfaces import Optics, Scene
+from dapple.scene.scene_optics import Optics
+from dapple.scene.surfaces import Scene, Surface
 
 CELL_M = np.array([[-50.0, -50.0], [50.0, 50.0]])
 # RAMI counts azimuths from its x axis, along which this scene has its sun: our east.
 SUN_ZENITH_DEG, SUN_AZIMUTH_DEG = 20.0, 90.0
-OPTICS = Optics(
+OPTICS = Optics.of_tree(
     wavelength_nm=np.array([0.0, 850.0]),
     leaf_reflectance=np.array([0.0, 0.4957]),
     leaf_transmittance=np.array([0.0, 0.4409]),
-    bark_reflectance=np.zeros(2),
+    wood_reflectance=np.zeros(2),
     ground_reflectance=np.array([0.159, 0.159]),
 )
 CASES = ("black leaves", "near infrared")
@@ -42,7 +43,7 @@ def load(folder: Path, variant: str) -> tuple[traced.TracedScene, float]:
     leaves = rami.disc_mesh(rami.read_discs(folder / "het01_UNI_sphere.def"))
     places = rami.read_places(folder / "het01_UNI_instances.def")
     index = leaves.area_m2 * len(places) / float(np.prod(CELL_M[1] - CELL_M[0]))
-    scene = traced.load(Scene({"leaf": leaves}), variant, places_m=places, cell_m=CELL_M)
+    scene = traced.load(Scene([Surface(leaves, places_m=places)]), variant, cell_m=CELL_M)
     return scene, index
 
 

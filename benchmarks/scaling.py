@@ -12,6 +12,7 @@ import json
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,7 @@ import rays
 
 from dapple.light import series, transport, visibility
 from dapple.scene import traced
+from dapple.scene.surfaces import Scene
 
 BASE = {"triangles": 350_000, "sensors": 72, "times": 30, "trees": 1}
 AXES = {
@@ -52,15 +54,15 @@ def point(triangles: int, sensors: int, times: int, trees: int, variant: str) ->
     run(tiny, 4, 4)
     del tiny
     scene = crown.scene("polygons", triangles)
-    places = None
     if trees > 1:
         side = int(np.ceil(np.sqrt(trees)))
         place = np.arange(trees)
         places = SPACING_M * np.stack([place % side, place // side, 0 * place], axis=1)
+        scene = Scene([replace(surface, places_m=places) for surface in scene.surfaces])
     before = memory_mb("VmRSS")
     Path("/proc/self/clear_refs").write_text("5")  # forgets the peak so far
     begin = now()
-    loaded = traced.load(scene, variant, places_m=places)
+    loaded = traced.load(scene, variant)
     spent = np.vstack([now() - begin, run(loaded, sensors, times)])
     engine_mb = memory_mb("VmHWM") - before
     # How many rays a second Mitsuba alone tests in this scene: the part of the growth that is its.

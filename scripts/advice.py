@@ -12,7 +12,7 @@ from dapple.formats import json, netcdf, tables, voxel_grids
 from dapple.formats.atomic import atomic
 from dapple.light import light_model, series
 from dapple.scene import scene_files, scene_optics, traced
-from dapple.scene.surfaces import Scene
+from dapple.scene.surfaces import LEAF, WOOD, Scene
 from dapple.workflow import run
 
 
@@ -109,7 +109,6 @@ def geometry_effects(one, base, inputs, params, truth):
     def load(scene):
         return traced.load(scene, params.variant)
 
-    wood = base.meshes["wood"]
     polygons = [
         (
             size,
@@ -124,15 +123,13 @@ def geometry_effects(one, base, inputs, params, truth):
     turbid = [
         (
             size,
-            lambda path=path: load(
-                Scene({"wood": wood}, voxel_grids.read(path), params.ground_z_m)
-            ),
+            lambda path=path: load(Scene(base.of(WOOD), voxel_grids.read(path), params.ground_z_m)),
         )
         for size, path in zip(params.voxel_sizes_m, inputs.voxels, strict=False)
     ]
     branches = [
         ("present", lambda: load(base)),
-        ("absent", lambda: load(Scene({"leaf": base.meshes["leaf"]}, None, params.ground_z_m))),
+        ("absent", lambda: load(Scene(base.of(LEAF), None, params.ground_z_m))),
     ]
     found = []
     for name, ladder in (

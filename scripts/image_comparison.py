@@ -12,7 +12,7 @@ from dapple.retrieval import coefficient_files as files
 from dapple.retrieval import coefficients as collision
 from dapple.retrieval import comparison, rendered_images, semiless, spectra
 from dapple.scene import scene_files
-from dapple.scene.surfaces import Optics
+from dapple.scene.scene_optics import Optics
 from dapple.streams import stream_seed
 from dapple.workflow import options, run
 
@@ -71,7 +71,7 @@ def renders(scene, traced, properties, light, params):
     parts, seconds = [], []
     for k in range(-1, len(properties)):  # the first is not counted: kernels are compiled
         row = max(k, 0)
-        optics = Optics(
+        optics = Optics.of_tree(
             np.array(BANDS, float),
             properties.leaf_reflectance[row],
             properties.leaf_transmittance[row],

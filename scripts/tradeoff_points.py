@@ -12,7 +12,7 @@ from dapple.light import light_model, series
 from dapple.light.light_model import Cost, Effort, Model, timed
 from dapple.light.timestep_series import Reference
 from dapple.scene import scene_files, scene_optics, traced
-from dapple.scene.surfaces import Scene
+from dapple.scene.surfaces import WOOD, Scene
 from dapple.workflow import run
 
 FINEST_PATHS, FINEST_PATCHES = 65_536, 2305
@@ -162,9 +162,12 @@ def geometries(params, inputs):
     base = scene_files.read([inputs.leaves], inputs.wood, params.ground_z_m)[0]
     if not inputs.sized_leaves:
         yield "polygons", params.polygon_size_m, base
-    wood = {"wood": base.meshes["wood"]}
     for size, path in zip(params.voxel_sizes_m, inputs.voxels, strict=False):
-        yield f"voxels_{size}", size, Scene(wood, voxel_grids.read(path), params.ground_z_m)
+        yield (
+            f"voxels_{size}",
+            size,
+            Scene(base.of(WOOD), voxel_grids.read(path), params.ground_z_m),
+        )
 
 
 def main(snakemake):

@@ -12,14 +12,15 @@ from dapple.frames import direction_from_angles
 from dapple.light import brf
 from dapple.scene import traced
 from dapple.scene.phase import phase_function
-from dapple.scene.surfaces import Optics, Scene
+from dapple.scene.scene_optics import Optics
+from dapple.scene.surfaces import Scene, Surface, of_kinds
 
 CELL = np.array([[0.0, 0.0], [4.0, 4.0]])
 SUN = direction_from_angles(30.0, 0.0)
 
 
 def optics(rho=0.0, tau=0.0, ground=0.0, bark=0.0):
-    return Optics(*(np.array([float(x)]) for x in (800.0, rho, tau, bark, ground)))
+    return Optics.of_tree(*(np.array([float(x)]) for x in (800.0, rho, tau, bark, ground)))
 
 
 def looking(zenith_deg, azimuth_deg=0.0):
@@ -66,7 +67,7 @@ def test_bare_ground_looks_the_same_from_everywhere():
 
 
 def test_a_leaf_that_covers_all_and_the_ground_below_share_light_by_a_geometric_series():
-    leaf = Scene({"leaf": quad((-1, 5), (-1, 5), 1.0)})
+    leaf = Scene(of_kinds(leaf=quad((-1, 5), (-1, 5), 1.0)))
     rho, tau, ground = 0.4, 0.3, 0.5
     between = 1 - rho * ground
     value, error = factor(leaf, looking([0, 60]), optics(rho, tau, ground))
@@ -106,7 +107,7 @@ def test_a_layer_scatters_once_by_its_phase_function(rho, tau):
 
 
 def test_sun_and_view_may_change_places():
-    scene, leaf = Scene({"leaf": rami.disc_mesh(discs())}), optics(0.45, 0.4, 0.2)
+    scene, leaf = Scene(of_kinds(leaf=rami.disc_mesh(discs()))), optics(0.45, 0.4, 0.2)
     places = [(30.0, 0.0), (55.0, 130.0)]
     (first, error_1), (second, error_2) = (
         factor(scene, looking(*view), leaf, sun=direction_from_angles(*sun), n_paths=60_000)
@@ -117,7 +118,7 @@ def test_sun_and_view_may_change_places():
 
 
 def test_nothing_is_lost_where_nothing_absorbs():
-    scene = Scene({"leaf": rami.disc_mesh(discs())}, voxels(0.3))
+    scene = Scene(of_kinds(leaf=rami.disc_mesh(discs())), voxels(0.3))
     up = looking([0.0])
     value, error = factor(scene, up, optics(0.6, 0.4, 1.0), cosine=True, max_orders=250)
     assert value[0] == pytest.approx(1.0, abs=4 * error[0])
@@ -130,7 +131,7 @@ def test_leaves_that_reach_over_a_side_come_in_at_the_other():
     shifted = leaves.copy()
     shifted[:, 1:3] += [3.1, -1.7]
     (first, error), (second, _) = (
-        factor(Scene({"leaf": rami.disc_mesh(d)}), looking([50.0], 30.0), leaf, n_paths=60_000)
+        factor(Scene(of_kinds(leaf=rami.disc_mesh(d))), looking([50.0], 30.0), leaf, n_paths=60_000)
         for d in (leaves, shifted)
     )
     assert first[0] == pytest.approx(second[0], abs=4 * 1.5 * error[0])
@@ -141,8 +142,8 @@ def test_a_repeated_cell_looks_like_many_of_them():
     """A cell of 2 × 2 copies is the same endless scene as one copy repeated."""
     one, leaf = rami.disc_mesh(discs()), optics(0.45, 0.4, 0.2)
     places = np.array([(x, y, 0.0) for x in (0.0, 4.0) for y in (0.0, 4.0)])
-    small = traced.load(Scene({"leaf": one}), cell_m=CELL)
-    large = traced.load(Scene({"leaf": one}), cell_m=2 * CELL, places_m=places)
+    small = traced.load(Scene(of_kinds(leaf=one)), cell_m=CELL)
+    large = traced.load(Scene([Surface(one, places_m=places)]), cell_m=2 * CELL)
     found = []
     for scene in (small, large):
         views = brf.over_cell(scene, looking([60.0], 75.0))
@@ -153,10 +154,10 @@ def test_a_repeated_cell_looks_like_many_of_them():
 
 
 def test_one_trace_serves_all_bands():
-    scene = traced.load(Scene({"leaf": rami.disc_mesh(discs())}), cell_m=CELL)
+    scene = traced.load(Scene(of_kinds(leaf=rami.disc_mesh(discs()))), cell_m=CELL)
     views = brf.over_cell(scene, looking([0.0, 40.0]))
     received = brf.collect(scene, views, SUN, n_paths=5000, max_orders=100, seed=1)
-    bands = Optics(
+    bands = Optics.of_tree(
         np.array([550.0, 850.0]),
         np.array([0.1, 0.45]),
         np.array([0.05, 0.4]),
@@ -170,7 +171,7 @@ def test_one_trace_serves_all_bands():
 
 
 def test_the_answer_depends_neither_on_threads_nor_on_blocks(monkeypatch):
-    scene = traced.load(Scene({"leaf": rami.disc_mesh(discs())}, voxels(0.5)), cell_m=CELL)
+    scene = traced.load(Scene(of_kinds(leaf=rami.disc_mesh(discs())), voxels(0.5)), cell_m=CELL)
     views = brf.over_cell(scene, looking([10.0, 40.0]))
     threads = dr.thread_count()
     try:

@@ -10,11 +10,11 @@ from dapple.formats import rami
 from dapple.formats.meshes import Mesh
 from dapple.frames import direction_from_angles
 from dapple.light import brf
-from dapple.light.tensor import spectral_factor
 from dapple.retrieval import coefficients, image_paths, rendered_images
 from dapple.retrieval.coefficients import Window
 from dapple.scene import traced
-from dapple.scene.surfaces import Optics, Scene
+from dapple.scene.scene_optics import Optics
+from dapple.scene.surfaces import Scene, of_kinds
 
 SUN = direction_from_angles(40.0, 250.0)
 WINDOW = Window(0.0, 4.0, 0.2, 20, 20)
@@ -36,7 +36,7 @@ def canopy(n=250, seed=3):
     places = rng.uniform([0, 0, 1.0], [4, 4, 3.0], (n, 3))
     leaves = rami.disc_mesh(np.column_stack([np.full(n, 0.15), places, normals]))
     slope = quad((-8, 12), (-8, 12), lambda x, _: 0.8 + 0.1 * x)
-    return Scene({"leaf": leaves, "ground": slope})
+    return Scene(of_kinds(leaf=leaves, ground=slope))
 
 
 def trace(scene, window=WINDOW, sun=SUN, **more):
@@ -55,8 +55,10 @@ def image(traced_once, rho=0.0, tau=0.0, soil=0.0, sky=0.0, bark=0.0):
 
 def exact_mean(traced_once, rho, tau, soil, sky):
     """Mean of the image from the kinds of paths, without any projection."""
-    optics = Optics(*(np.array([x]) for x in (800.0, rho, tau, 0.0, soil)))
-    sun, from_sky = traced_once.light @ spectral_factor(traced_once.orders, optics)[:, 0]
+    optics = Optics.of_tree(*(np.array([x]) for x in (800.0, rho, tau, 0.0, soil)))
+    sun, from_sky = (
+        traced_once.light @ traced_once.counters.spectral_factor(traced_once.orders, optics)[:, 0]
+    )
     return (1 - sky) * sun + sky * from_sky
 
 
@@ -67,7 +69,7 @@ def test_bare_ground_has_its_own_reflectance_in_every_pixel():
 
 
 def test_a_slope_is_as_bright_as_it_faces_the_sun_and_as_much_sky_as_it_sees():
-    slope = Scene({"ground": quad((-50, 50), (-50, 50), lambda x, _: 100 - 0.5 * x)})
+    slope = Scene(of_kinds(ground=quad((-50, 50), (-50, 50), lambda x, _: 100 - 0.5 * x)))
     seen = trace(slope)
     normal = np.array([0.5, 0.0, 1.0]) / np.hypot(0.5, 1.0)
     little = 1e-6  # so that light does not go back and forth between slope and plane
@@ -80,11 +82,11 @@ def test_a_slope_is_as_bright_as_it_faces_the_sun_and_as_much_sky_as_it_sees():
 def test_a_slope_that_faces_away_from_the_sun_is_dark():
     steep = quad((-50, 50), (-50, 50), lambda x, _: 200 - 3 * x)
     towards_west = direction_from_angles(60.0, 270.0)
-    assert image(trace(Scene({"ground": steep}), sun=towards_west), soil=1e-6).max() < 1e-9
+    assert image(trace(Scene(of_kinds(ground=steep)), sun=towards_west), soil=1e-6).max() < 1e-9
 
 
 def test_a_leaf_over_everything_shares_light_with_the_ground_by_a_geometric_series():
-    covered = trace(Scene({"leaf": quad((-400, 400), (-400, 400), 1.0)}), n_paths=400)
+    covered = trace(Scene(of_kinds(leaf=quad((-400, 400), (-400, 400), 1.0))), n_paths=400)
     rho, tau, soil = 0.45, 0.35, 0.4
     np.testing.assert_allclose(image(covered, rho, tau), rho, atol=2e-3)  # black ground
     for sky in (0.0, 1.0):
@@ -106,7 +108,7 @@ def test_the_mean_is_that_of_views_of_the_whole_window(of_canopy):
     )  # fmt: skip
     received = brf.collect(scene, views, SUN, n_paths=40_000, max_orders=60, seed=5)
     for rho, tau, soil, sky in ((0.1, 0.05, 0.2, 0.3), (0.5, 0.4, 0.3, 0.1), (0.35, 0.55, 0.1, 0)):
-        optics = Optics(*(np.array([x]) for x in (800.0, rho, tau, 0.0, soil)))
+        optics = Optics.of_tree(*(np.array([x]) for x in (800.0, rho, tau, 0.0, soil)))
         value, error = brf.reflectance_factor(received, optics, diffuse_share=sky)
         found = image(of_canopy, rho, tau, soil, sky).mean()
         assert found == pytest.approx(value[0, 0], abs=4 * 1.3 * error[0, 0])
@@ -166,12 +168,12 @@ def test_tiles_change_nothing(monkeypatch, of_canopy):
 
 def test_north_is_up_and_shade_falls_away_from_the_sun():
     leaf = quad((3.0, 3.4), (3.4, 3.8), 2.0)
-    scene = Scene({"leaf": leaf, "ground": quad((-9, 9), (-9, 9), 0.0)})
+    scene = Scene(of_kinds(leaf=leaf, ground=quad((-9, 9), (-9, 9), 0.0)))
     west = direction_from_angles(45.0, 90.0)  # the sun in the east: shade 2 m to the west
     seen = trace(scene, sun=west)
     bright = image(seen, rho=0.5, soil=0.2)
     rendered = rendered_images.Renderer(scene).render(
-        WINDOW, west, Optics(*(np.array([x]) for x in (800.0, 0.5, 0.0, 0.0, 0.2))),
+        WINDOW, west, Optics.of_tree(*(np.array([x]) for x in (800.0, 0.5, 0.0, 0.0, 0.2))),
         np.zeros(1), n_paths=16, seed=1,
     ).image[0]  # fmt: skip
     for one in (bright, rendered):
@@ -181,7 +183,7 @@ def test_north_is_up_and_shade_falls_away_from_the_sun():
 
 
 def test_direct_renders_agree(of_canopy):
-    optics = Optics(
+    optics = Optics.of_tree(
         np.arange(4.0), *(np.array(x) for x in (
             [0.05, 0.1, 0.35, 0.55], [0.01, 0.15, 0.5, 0.4], [0.0] * 4, [0.1, 0.2, 0.3, 0.4]
         ))
@@ -191,8 +193,8 @@ def test_direct_renders_agree(of_canopy):
         WINDOW, SUN, optics, share, n_paths=256, n_passes=4, seed=2
     )
     ours = coefficients.images(
-        of_canopy, optics.leaf_reflectance, optics.leaf_transmittance, optics.bark_reflectance,
-        optics.ground_reflectance, share,
+        of_canopy, optics.reflectance["leaf"], optics.transmittance["leaf"],
+        optics.reflectance["wood"], optics.reflectance["ground"], share,
     )  # fmt: skip
     error = made.passes.mean(axis=(2, 3)).std(axis=0, ddof=1) / 2
     difference = (made.image - ours).mean(axis=(1, 2))
@@ -204,7 +206,7 @@ def test_direct_renders_agree(of_canopy):
 def test_a_renderer_takes_new_colours_every_time():
     renderer = rendered_images.Renderer(canopy())
     dark, bright = (
-        Optics(*(np.array([x]) for x in (800.0, *values)))
+        Optics.of_tree(*(np.array([x]) for x in (800.0, *values)))
         for values in ((0.02, 0.01, 0.0, 0.05), (0.5, 0.4, 0.0, 0.4))
     )
     settings = {"n_paths": 16, "seed": 3}
@@ -220,6 +222,6 @@ def test_a_sun_below_the_horizon_is_an_error():
 
 
 def test_terrain_below_the_flat_ground_is_an_error():
-    hollow = Scene({"ground": quad((0, 1), (0, 1), -0.5)})
+    hollow = Scene(of_kinds(ground=quad((0, 1), (0, 1), -0.5)))
     with pytest.raises(InputError, match="where the terrain is lowest"):
         traced.load(hollow)

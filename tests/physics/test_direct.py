@@ -9,7 +9,7 @@ from dapple.formats.meshes import Mesh
 from dapple.light import rays_to_sky
 from dapple.light.visibility import sunlit
 from dapple.scene import traced
-from dapple.scene.surfaces import Scene
+from dapple.scene.surfaces import Scene, of_kinds
 
 SENSOR = np.array([[0.0, 0.0, 0.5]])
 UP = np.array([[0.0, 0.0, 1.0]])
@@ -73,7 +73,7 @@ def test_in_the_penumbra_of_an_edge_errors_are_what_they_are_said_to_be():
     height_m = 4.0
     place = np.linspace(-1.2, 1.2, 61)
     sensors_m = np.stack([place * height_m * np.sin(SUN_RADIUS), 0 * place, 0 * place], axis=1)
-    found = see(Scene({"leaf": half_plane(height_m)}), sensors_m, UP, tolerance=0.004)
+    found = see(Scene(of_kinds(leaf=half_plane(height_m))), sensors_m, UP, tolerance=0.004)
     error = found.share.mean(axis=0)[:, 0] - seen_beside_an_edge(place)
     assert np.sqrt((error**2).mean()) < 0.004
     assert found.standard_error.max() <= 0.004
@@ -84,19 +84,21 @@ def test_in_the_penumbra_of_an_edge_errors_are_what_they_are_said_to_be():
 
 def test_rays_go_where_the_sun_is_partly_hidden():
     sensors_m = np.array([[-2.0, 0.0, 0.0], [0.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
-    full, half, none = see(Scene({"wood": half_plane(4.0)}), sensors_m, UP).n_rays[:, 0]
+    full, half, none = see(Scene(of_kinds(wood=half_plane(4.0))), sensors_m, UP).n_rays[:, 0]
     assert full == none
     assert half > 4 * full
 
 
 def test_no_more_rays_than_allowed_are_traced():
-    found = see(Scene({"wood": half_plane(4.0)}), SENSOR * 0, UP, tolerance=1e-9, max_rays=1000)
+    found = see(
+        Scene(of_kinds(wood=half_plane(4.0))), SENSOR * 0, UP, tolerance=1e-9, max_rays=1000
+    )
     assert found.n_rays[0, 0] == 1000 / len(found.share)
 
 
 def test_a_wide_sensor_sees_part_of_the_sun_on_either_side_of_an_edge():
     found = see(
-        Scene({"wood": half_plane(1.0)}),
+        Scene(of_kinds(wood=half_plane(1.0))),
         np.array([[0.25, 0.0, 0.0]]),
         UP,
         aperture_m=1.0,
@@ -107,13 +109,13 @@ def test_a_wide_sensor_sees_part_of_the_sun_on_either_side_of_an_edge():
 
 def test_a_hardly_lit_sensor_is_not_said_to_be_dark_for_certain():
     place = np.array([[0.97 * 4.0 * np.sin(SUN_RADIUS), 0.0, 0.0]])
-    found = see(Scene({"leaf": half_plane(4.0)}), place, UP, tolerance=0.1)
+    found = see(Scene(of_kinds(leaf=half_plane(4.0))), place, UP, tolerance=0.1)
     assert 0 < found.standard_error[0, 0] < 0.1
 
 
 def test_a_grid_and_a_leaf_together_stop_what_each_lets_through():
     layer = turbid_slab(1.0)
-    found = see(Scene({"leaf": half_plane(0.8)}, layer), SENSOR, UP)
+    found = see(Scene(of_kinds(leaf=half_plane(0.8)), layer), SENSOR, UP)
     assert found.share.mean() == pytest.approx(0.5 * np.exp(-0.5), abs=0.003)
 
 
@@ -121,7 +123,7 @@ def test_a_repeated_cell_stops_the_beam_like_the_endless_thing():
     """A roof with a slit of 1 m every 4 m: 3 m above ground, the sun at 45° across it."""
     roof = half_plane(3.0)
     roof = Mesh(roof.vertices_m * [3 / 50, 1, 1], roof.faces, roof.element)
-    scene = traced.load(Scene({"wood": roof}), cell_m=np.array([[0.0, 0.0], [4.0, 4.0]]))
+    scene = traced.load(Scene(of_kinds(wood=roof)), cell_m=np.array([[0.0, 0.0], [4.0, 4.0]]))
     x = np.linspace(0.05, 3.95, 40)
     sensors_m = np.stack([x, 0 * x + 2.0, 0 * x], axis=1)
     found = sunlit(
@@ -139,7 +141,7 @@ def test_a_repeated_cell_stops_the_beam_like_the_endless_thing():
 
 def test_the_answer_depends_neither_on_threads_nor_on_blocks(monkeypatch):
     sensors_m = np.stack([np.linspace(-0.02, 0.02, 40), np.zeros(40), np.zeros(40)], axis=1)
-    scene = Scene({"leaf": half_plane(4.0)}, turbid_slab(1.0))
+    scene = Scene(of_kinds(leaf=half_plane(4.0)), turbid_slab(1.0))
     threads = dr.thread_count()
     try:
         found = []

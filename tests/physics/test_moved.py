@@ -9,7 +9,7 @@ from dapple.formats.meshes import Mesh
 from dapple.light import series
 from dapple.light.moved_sensors import moved_light
 from dapple.scene import traced
-from dapple.scene.surfaces import Scene
+from dapple.scene.surfaces import Scene, of_kinds
 
 BEAM, SKY = 1500.0, 200.0
 SENSOR = np.array([[0.0, 0.0, 0.5]])
@@ -20,7 +20,7 @@ def plate(half_m):
     corners = half_m * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], float)
     vertices = np.column_stack([corners, np.full(4, 1.0)])
     faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
-    return Scene({"leaf": Mesh(vertices, faces, np.zeros(2, np.int32))})
+    return Scene(of_kinds(leaf=Mesh(vertices, faces, np.zeros(2, np.int32))))
 
 
 def shaded():

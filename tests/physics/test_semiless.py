@@ -6,12 +6,12 @@ import xarray as xr
 
 from dapple.formats.meshes import Mesh
 from dapple.frames import direction_from_angles
-from dapple.light.tensor import spectral_factor
 from dapple.optics.leaf import leaf_spectra
 from dapple.retrieval import coefficients, image_paths, semiless
 from dapple.retrieval.coefficients import Window
 from dapple.scene import traced
-from dapple.scene.surfaces import Optics, Scene
+from dapple.scene.scene_optics import Optics
+from dapple.scene.surfaces import Scene, of_kinds
 
 NADIR = np.array([0.0, 0.0, 1.0])
 RHO = 0.6
@@ -27,7 +27,7 @@ def screen(half_width_m=30.0, strip_m=0.1):
     faces = (first + np.array([[0, 1, 2], [1, 3, 2]])).reshape(-1, 3)
     vertices = np.column_stack([corners, np.full(len(corners), 3.0)])
     return Scene(
-        {"leaf": Mesh(vertices, faces.astype(np.int32), np.repeat(np.arange(len(low)), 2))}
+        of_kinds(leaf=Mesh(vertices, faces.astype(np.int32), np.repeat(np.arange(len(low)), 2)))
     )
 
 
@@ -48,8 +48,9 @@ def means(scene, sun, *, n_paths=1000):
     traced_once = image_paths.trace(traced.load(scene), window, sun, n_paths=n_paths, seed=1)
 
     def mean(soil):
-        optics = Optics(*(np.array([x]) for x in (800.0, RHO, 0.0, 0.0, soil)))
-        return (traced_once.light[0] @ spectral_factor(traced_once.orders, optics))[0]
+        optics = Optics.of_tree(*(np.array([x]) for x in (800.0, RHO, 0.0, 0.0, soil)))
+        factor = traced_once.counters.spectral_factor(traced_once.orders, optics)
+        return (traced_once.light[0] @ factor)[0]
 
     return mean, traced_once
 
@@ -76,9 +77,10 @@ def test_no_light_from_above_leaves_a_straight_line():
 
 def test_t1_is_all_light_of_one_ground_reflection():
     mean, traced_once = means(screen(), NADIR)
-    once = traced_once.orders[:, 3] == 1
-    optics = Optics(*(np.array([x]) for x in (800.0, RHO, 0.0, 0.0, 1.0)))
-    light = (traced_once.light[0] * once) @ spectral_factor(traced_once.orders, optics)
+    counters = traced_once.counters
+    once = traced_once.orders[:, counters.reflected("ground")] == 1
+    optics = Optics.of_tree(*(np.array([x]) for x in (800.0, RHO, 0.0, 0.0, 1.0)))
+    light = (traced_once.light[0] * once) @ counters.spectral_factor(traced_once.orders, optics)
     assert terms(mean)[1] == pytest.approx(light[0], abs=2e-3)
 
 

@@ -8,7 +8,7 @@ from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
 from dapple.light import rays_to_sky
 from dapple.light.rays_to_sky import sky_visibility, sun_visibility
-from dapple.scene.surfaces import Scene
+from dapple.scene.surfaces import Scene, of_kinds
 
 UP = np.array([[0.0, 0.0, 1.0]])
 
@@ -52,7 +52,7 @@ def test_an_open_place_sees_all_of_the_sun_and_none_after_sunset():
 
 def test_the_penumbra_of_an_edge_is_the_part_of_the_disc_beside_it():
     height, radius = 4.0, 4.0 * np.tan(np.radians(0.265))
-    scene = Scene({"leaf": rectangle((0.0, 50.0), (-50.0, 50.0), height)})
+    scene = Scene(of_kinds(leaf=rectangle((0.0, 50.0), (-50.0, 50.0), height)))
     edge = np.linspace(-1.2, 1.2, 13)  # distance into the shade in radii of the sun
     points = np.column_stack([edge * radius, np.zeros(13), np.zeros(13)])
     s = np.clip(edge, -1.0, 1.0)
@@ -62,7 +62,7 @@ def test_the_penumbra_of_an_edge_is_the_part_of_the_disc_beside_it():
 
 
 def test_a_wide_entrance_softens_an_edge():
-    scene = Scene({"wood": rectangle((0.0, 50.0), (-50.0, 50.0), 1.0)})
+    scene = Scene(of_kinds(wood=rectangle((0.0, 50.0), (-50.0, 50.0), 1.0)))
     points = np.array([[0.25, 0.0, 0.0]])
     seen = sun_visibility(scene, points, UP, n_disc=4096, seed=2, aperture_m=1.0)[0, 0]
     expected = (np.arccos(0.5) - 0.5 * np.sqrt(0.75)) / np.pi
@@ -105,13 +105,15 @@ def test_every_voxel_stands_where_its_coordinates_say():
 
 @pytest.mark.parametrize("radius", [0.3, 1.0, 4.0])
 def test_a_disc_overhead_hides_its_cosine_weighted_share_of_the_sky(radius):
-    scene = Scene({"leaf": disc(radius, 1.0)})
+    scene = Scene(of_kinds(leaf=disc(radius, 1.0)))
     seen = sky_visibility(scene, np.zeros((1, 3)), n=4096, seed=6)[0]
     assert seen == pytest.approx(1.0 / (1.0 + radius**2), abs=0.004)
 
 
 def test_the_answer_does_not_depend_on_how_rays_are_dealt_to_kernels(monkeypatch):
-    scene = Scene({"leaf": disc(0.5, 1.0)}, voxels(np.full((2, 2, 2), 0.7), low=(-1.0, -1.0, 2.0)))
+    scene = Scene(
+        of_kinds(leaf=disc(0.5, 1.0)), voxels(np.full((2, 2, 2), 0.7), low=(-1.0, -1.0, 2.0))
+    )
     points = np.random.default_rng(7).uniform(-1.0, 1.0, (7, 3)) * [1.0, 1.0, 0.0]
     way = directions(np.linspace(0.0, 60.0, 5), 20.0)
     whole = sun_visibility(scene, points, way, n_disc=8, seed=8)

@@ -7,7 +7,8 @@ from dapple.config.settings import Settings
 from dapple.formats.meshes import Mesh
 from dapple.retrieval.spectra import of_shoots
 from dapple.scene import mitsuba_scene
-from dapple.scene.surfaces import Optics, Scene
+from dapple.scene.scene_optics import Optics
+from dapple.scene.surfaces import Scene, of_kinds
 from dapple.virtual import conifers
 
 N_RAYS = 400_000
@@ -53,7 +54,7 @@ def recollision(mesh, rng):
     sphere = rng.normal(size=(N_RAYS, 3))
     way = normal + sphere / np.linalg.norm(sphere, axis=1, keepdims=True)
     way /= np.linalg.norm(way, axis=1, keepdims=True)
-    loaded = mitsuba_scene.build(Scene({"leaf": mesh}), Optics(*np.full((5, 3), 0.2)))
+    loaded = mitsuba_scene.build(Scene(of_kinds(leaf=mesh)), Optics.of_tree(*np.full((5, 3), 0.2)))
     mi = loaded.mi
     ray = mi.Ray3f(*((x.T).astype(np.float32) for x in (start + 1e-5 * normal, way)))
     ray.maxt = 0.5

@@ -11,9 +11,10 @@ from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
 from dapple.light.rays_to_sky import sun_visibility
 from dapple.light.timestep import Effort, timestep
-from dapple.scene import mitsuba_scene
+from dapple.scene import mitsuba_scene, render_scene
 from dapple.scene.phase import phase_function
-from dapple.scene.surfaces import Optics, Scene, group_bands, group_flux
+from dapple.scene.scene_optics import Optics, group_bands, group_flux
+from dapple.scene.surfaces import Scene, Surface, of_kinds
 from dapple.sky.sky_radiance import diffuse_normalisation, relative_radiance
 
 BEAM, DIFFUSE = np.array([500.0, 600.0, 700.0]), np.array([90.0, 80.0, 70.0])
@@ -24,7 +25,7 @@ ISOTROPIC = np.zeros(5)
 
 def optics(rho=0.0, tau=0.0, bark=0.0, ground=0.0, n=3):
     values = (np.broadcast_to(np.asarray(v, float), n).copy() for v in (rho, tau, bark, ground))
-    return Optics(np.linspace(450.0, 650.0, n), *values)
+    return Optics.of_tree(np.linspace(450.0, 650.0, n), *values)
 
 
 def light(scene, sensors=ORIGIN, *, zenith=30.0, azimuth=0.0, beam=BEAM, diffuse=DIFFUSE, **more):
@@ -112,7 +113,7 @@ def test_an_uneven_sky_gives_the_same_diffuse_light_on_the_level():
 
 def test_the_sky_map_carries_the_irradiance_of_the_radiance_function():
     radiance = partial(relative_radiance, CLEAR, 50.0, 110.0)
-    sky = mitsuba_scene.sky_map(radiance, (181, 360))
+    sky = render_scene.sky_map(radiance, (181, 360))
     ratio = sky[30, 100] / radiance(30.0, 100.5)
     assert ratio == pytest.approx(1.0 / diffuse_normalisation(CLEAR, 50.0), rel=2e-3)
 
@@ -123,7 +124,7 @@ def test_a_wall_shades_from_the_side_on_which_it_stands(azimuth):
     out, along = np.array([np.sin(angle), np.cos(angle), 0.0]), np.array([0.0, 0.0, 100.0])
     side = 100.0 * np.array([np.cos(angle), -np.sin(angle), 0.0])
     wall = quad([0.01 * out + s * side + t * along for s, t in ((-1, 0), (1, 0), (1, 1), (-1, 1))])
-    scene = mitsuba_scene.build(Scene({"wood": wall}), optics(bark=0.5))
+    scene = mitsuba_scene.build(Scene(of_kinds(wood=wall)), optics(bark=0.5))
 
     def sky(z, a):
         """Brighter by 60 % of the direction's eastward and 30 % of its northward part."""
@@ -144,7 +145,7 @@ def test_a_wall_shades_from_the_side_on_which_it_stands(azimuth):
 
 @pytest.mark.parametrize("radius", [0.5, 2.0])
 def test_a_black_disc_overhead_hides_its_share_of_the_sky(radius):
-    scene = mitsuba_scene.build(Scene({"leaf": disc(radius, 1.0)}), optics())
+    scene = mitsuba_scene.build(Scene(of_kinds(leaf=disc(radius, 1.0))), optics())
     found = light(scene, zenith=0.0, effort=Effort(sky=2048))
     assert found["sky"][0] == pytest.approx(DIFFUSE / (1.0 + radius**2), rel=5e-3)
     assert (found["direct"] == 0.0).all()
@@ -152,7 +153,9 @@ def test_a_black_disc_overhead_hides_its_share_of_the_sky(radius):
 
 def test_the_sun_is_a_disc_with_a_penumbra():
     radius = 4.0 * np.tan(np.radians(0.265))
-    scene = mitsuba_scene.build(Scene({"leaf": level((0.0, 50.0), (-50.0, 50.0), 4.0)}), optics())
+    scene = mitsuba_scene.build(
+        Scene(of_kinds(leaf=level((0.0, 50.0), (-50.0, 50.0), 4.0))), optics()
+    )
     edge = np.array([-1.1, -0.7, -0.2, 0.0, 0.4, 0.9, 1.1])
     sensors = np.column_stack([edge * radius, np.zeros((7, 2))])
     found = light(scene, sensors, zenith=0.0, effort=Effort(direct=512))
@@ -164,7 +167,7 @@ def test_the_sun_is_a_disc_with_a_penumbra():
 def test_a_sheet_that_transmits_turns_beam_and_sky_into_scattered_light():
     tau = np.array([0.1, 0.4, 0.2])
     scene = mitsuba_scene.build(
-        Scene({"leaf": level((-400.0, 400.0), (-400.0, 400.0), 1.0)}), optics(tau=tau)
+        Scene(of_kinds(leaf=level((-400.0, 400.0), (-400.0, 400.0), 1.0))), optics(tau=tau)
     )
     found = light(scene, zenith=60.0, effort=Effort(scattered=512))
     assert (found["direct"] == 0.0).all()
@@ -175,7 +178,7 @@ def test_a_sheet_that_transmits_turns_beam_and_sky_into_scattered_light():
 def test_light_between_a_sheet_and_the_ground_sums_a_geometric_series():
     rho, tau, ground = 0.5, 0.4, 0.6
     scene = mitsuba_scene.build(
-        Scene({"leaf": level((-400.0, 400.0), (-400.0, 400.0), 0.5)}),
+        Scene(of_kinds(leaf=level((-400.0, 400.0), (-400.0, 400.0), 0.5))),
         optics(rho=rho, tau=tau, ground=ground),
     )
     found = light(scene, effort=Effort(scattered=1024, max_depth=40))
@@ -189,10 +192,10 @@ def test_in_a_furnace_every_sensor_sees_the_same_light(form):
     trunk = level((-0.3, 0.3), (-0.3, 0.3), 1.2)
     if form == "polygons":
         meshes = {"leaf": leaves(150, 0.4, (-1, -1, 0.6), (1, 1, 2.0), 3), "wood": trunk}
-        scene = Scene(meshes)
+        scene = Scene(of_kinds(**meshes))
     else:
         density = np.random.default_rng(3).random((4, 3, 2)) * 4.0
-        scene = Scene({"wood": trunk}, voxels(density, 0.5, (-1.0, -0.7, 0.5)))
+        scene = Scene(of_kinds(wood=trunk), voxels(density, 0.5, (-1.0, -0.7, 0.5)))
     sensors = np.array([[0.0, 0.0, 0.0], [0.5, 0.1, 1.0], [0.2, 0.2, 5.0], [-1.0, 2.0, 0.2]])
     effort = Effort(sky=256, scattered=256, max_depth=400, roulette_depth=400)
     found = light(mitsuba_scene.build(scene, conserving), sensors, beam=0.0 * BEAM, effort=effort)
@@ -265,7 +268,7 @@ def test_many_small_leaves_do_what_a_turbid_medium_does():
     sensors = np.array([[x, y, 0.5] for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)])
     found = [
         light(mitsuba_scene.build(scene, leaf), sensors, effort=Effort(scattered=256))
-        for scene in (Scene({"leaf": cloud}), Scene(voxels=turbid))
+        for scene in (Scene(of_kinds(leaf=cloud)), Scene(voxels=turbid))
     ]
     polygons, medium = ({part: f[part].mean() for part in ("sky", "scattered")} for f in found)
     assert polygons["scattered"] == pytest.approx(medium["scattered"], rel=0.06)
@@ -274,7 +277,7 @@ def test_many_small_leaves_do_what_a_turbid_medium_does():
 
 def test_standard_errors_are_what_repetition_shows():
     scene = mitsuba_scene.build(
-        Scene({"leaf": leaves(2000, 0.1, (-1, -1, 1), (1, 1, 2), 9)}), optics(rho=0.2, tau=0.2)
+        Scene(of_kinds(leaf=leaves(2000, 0.1, (-1, -1, 1), (1, 1, 2), 9))), optics(rho=0.2, tau=0.2)
     )
     sensors = np.random.default_rng(1).uniform(-1.0, 1.0, (40, 3)) * [1.0, 1.0, 0.0]
     effort = Effort(replicates=16, direct=8, sky=8, scattered=8)
@@ -287,7 +290,7 @@ def test_standard_errors_are_what_repetition_shows():
 
 def test_the_same_seed_gives_the_same_numbers_and_another_seed_others():
     scene = mitsuba_scene.build(
-        Scene({"leaf": leaves(500, 0.2, (-1, -1, 1), (1, 1, 2), 9)}), optics(rho=0.2, tau=0.2)
+        Scene(of_kinds(leaf=leaves(500, 0.2, (-1, -1, 1), (1, 1, 2), 9))), optics(rho=0.2, tau=0.2)
     )
     first, between, again = (
         light(scene, azimuth=azimuth, seed=seed) for azimuth, seed in ((40, 7), (90, 8), (40, 7))
@@ -299,7 +302,7 @@ def test_the_same_seed_gives_the_same_numbers_and_another_seed_others():
 
 
 def test_night_is_dark_and_dusk_has_no_beam():
-    scene = mitsuba_scene.build(Scene({"leaf": disc(0.5, 1.0)}), optics(rho=0.1))
+    scene = mitsuba_scene.build(Scene(of_kinds(leaf=disc(0.5, 1.0))), optics(rho=0.1))
     night = light(scene, zenith=110.0, beam=0.0 * BEAM, diffuse=0.0 * DIFFUSE)
     assert all((values == 0.0).all() for values in night.values())
     dusk = light(scene, zenith=92.0)
@@ -313,7 +316,7 @@ def test_few_groups_of_bands_do_for_all_bands():
     nm = np.arange(400.0, 701.0, 15.0)
     green = np.exp(-(((nm - 550.0) / 40.0) ** 2))
     edge = np.clip((nm - 685.0) / 15.0, 0.0, 1.0)
-    full = Optics(
+    full = Optics.of_tree(
         nm,
         0.04 + 0.08 * green + 0.15 * edge,
         0.01 + 0.10 * green + 0.12 * edge,
@@ -322,7 +325,7 @@ def test_few_groups_of_bands_do_for_all_bands():
     )
     beam = 20.0 + 0.02 * (nm - 400.0)
     diffuse = 6.0 * (500.0 / nm) ** 2
-    scene = Scene({"leaf": leaves(3000, 0.12, (-1, -1, 0.5), (1, 1, 2.5), 9)})
+    scene = Scene(of_kinds(leaf=leaves(3000, 0.12, (-1, -1, 0.5), (1, 1, 2.5), 9)))
     sensors = np.random.default_rng(1).uniform(-1.0, 1.0, (30, 3)) * [1.0, 1.0, 0.0]
     effort = Effort(replicates=4, direct=64, sky=64, scattered=256)
 
@@ -331,7 +334,7 @@ def test_few_groups_of_bands_do_for_all_bands():
         return light(built, sensors, beam=beam, diffuse=diffuse, effort=effort)["par"]
 
     def bands(chosen):
-        return Optics(*(getattr(full, name)[chosen] for name in full.__dataclass_fields__))
+        return full.each(lambda values: values[chosen])
 
     triples = [slice(k, k + 3) for k in range(0, 21, 3)]
     exact = sum(par(bands(k), beam[k], diffuse[k]) for k in triples)
@@ -349,8 +352,8 @@ def test_groups_of_bands_keep_flux_and_means():
     assert (np.diff(group) >= 0).all()
     sums = group_flux(flux, group, 3)
     assert sums.sum() == flux.sum()
-    assert (sums * grouped.leaf_reflectance).sum() == pytest.approx(
-        (flux * full.leaf_reflectance).sum()
+    assert (sums * grouped.reflectance["leaf"]).sum() == pytest.approx(
+        (flux * full.reflectance["leaf"]).sum()
     )
 
 
@@ -359,8 +362,16 @@ def test_groups_of_bands_keep_flux_and_means():
     [
         ("below the ground", lambda: light(mitsuba_scene.build(Scene(), optics()), ORIGIN - 0.1)),
         ("61 bands", lambda: mitsuba_scene.build(Scene(), optics(n=61))),
-        ("leaf_albedo", lambda: mitsuba_scene.build(Scene(), optics(rho=0.7, tau=0.5))),
-        ("kind", lambda: mitsuba_scene.build(Scene({"fruit": disc(1.0, 1.0)}), optics())),
+        (
+            "leaf albedo",
+            lambda: mitsuba_scene.build(
+                Scene(of_kinds(leaf=disc(1.0, 1.0))), optics(rho=0.7, tau=0.5)
+            ),
+        ),
+        (
+            "no reflectance of `fruit`",
+            lambda: mitsuba_scene.build(Scene([Surface(disc(1.0, 1.0), "fruit")]), optics()),
+        ),
         ("replicates", lambda: Effort(replicates=1)),
         (
             "erectophile",

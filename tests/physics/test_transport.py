@@ -10,7 +10,8 @@ from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
 from dapple.light import paths, tensor, transport
 from dapple.scene import traced
-from dapple.scene.surfaces import Optics, Scene
+from dapple.scene.scene_optics import Optics
+from dapple.scene.surfaces import Scene, Surface, of_kinds
 from dapple.sky.patches import patches
 
 SENSOR = np.array([[0.0, 0.0, 0.5]])
@@ -19,11 +20,11 @@ COLUMNS = ("sky_seen", "sensor", "replicate", "patch", "orders", "count", "n_pat
 
 def optics(leaf_reflectance, leaf_transmittance, bark=0.0, ground=0.0):
     bands = np.atleast_1d(np.asarray(leaf_reflectance, float))
-    return Optics(
+    return Optics.of_tree(
         wavelength_nm=np.full(bands.shape, 550.0),
         leaf_reflectance=bands,
         leaf_transmittance=np.full(bands.shape, leaf_transmittance, float),
-        bark_reflectance=np.full(bands.shape, bark, float),
+        wood_reflectance=np.full(bands.shape, bark, float),
         ground_reflectance=np.full(bands.shape, ground, float),
     )
 
@@ -84,7 +85,7 @@ def leaf_cloud(n=300):
     )
 
 
-MIXED = Scene({"leaf": leaf_cloud()}, turbid_slab(0.5))
+MIXED = Scene(of_kinds(leaf=leaf_cloud()), turbid_slab(0.5))
 
 
 def test_an_open_sky_of_radiance_one_gives_pi():
@@ -104,7 +105,7 @@ def test_a_sky_seen_through_the_patches_keeps_its_cosine_weighted_integral():
 @pytest.mark.parametrize("radius", [0.5, 1.0, 4.0])
 def test_a_leaf_overhead_hides_its_solid_angle_and_lets_its_transmittance_through(radius):
     """Each of its points gets pi from the sky, of which τ goes on evenly to all sides below."""
-    counted = collect(Scene({"leaf": disc(radius, 1.5)}), n_paths=100_000)
+    counted = collect(Scene(of_kinds(leaf=disc(radius, 1.5))), n_paths=100_000)
     hidden = radius**2 / (1 + radius**2)
     for tau in (0.0, 0.4):
         mean, error = total(counted, optics(0.3, tau))
@@ -116,7 +117,7 @@ def test_an_endless_wall_gives_back_half_of_what_half_the_sky_gives_it():
     """It hides half the sky (π/2), and sends ρ/2 from there, as half the sky lights it."""
     far = 5000.0
     wall = quad([[0.5, -far, -1], [0.5, far, -1], [0.5, far, far], [0.5, -far, far]])
-    mean, error = total(collect(Scene({"wood": wall})), optics(0, 0, bark=0.6))
+    mean, error = total(collect(Scene(of_kinds(wood=wall))), optics(0, 0, bark=0.6))
     assert mean == pytest.approx(np.pi / 2 * (1 + 0.6 / 2), abs=4 * error)
 
 
@@ -222,7 +223,7 @@ def test_without_any_order_only_light_straight_from_the_sky_is_left():
 
 def test_a_closed_box_lets_nothing_in():
     ceiling = quad([[-500, -500, 1], [500, -500, 1], [500, 500, 1], [-500, 500, 1]])
-    counted = collect(Scene({"wood": ceiling}), n_paths=4000, max_orders=20)
+    counted = collect(Scene(of_kinds(wood=ceiling)), n_paths=4000, max_orders=20)
     assert total(counted, optics(0, 0, bark=0.5, ground=0.5))[0] < 1e-3 * np.pi
 
 
@@ -232,9 +233,11 @@ def test_plants_stored_once_scatter_at_every_place_like_plants_in_one_mesh():
     vertices = (one.vertices_m + shift[:, None]).reshape(-1, 3)
     faces = (one.faces + len(one.vertices_m) * np.arange(3)[:, None, None]).reshape(-1, 3)
     merged = Mesh(vertices, faces.astype(np.int32), np.zeros(len(faces), np.int32))
-    scenes = traced.load(Scene({"leaf": one}), places_m=shift), traced.load(Scene({"leaf": merged}))
+    scenes = Scene([Surface(one, places_m=shift)]), Scene(of_kinds(leaf=merged))
     found = [
-        transport.collect(scene, SENSOR, n_paths=40_000, n_patches=145, max_orders=60, seed=1)
+        transport.collect(
+            traced.load(scene), SENSOR, n_paths=40_000, n_patches=145, max_orders=60, seed=1
+        )
         for scene in scenes
     ]
     (first, error), (second, _) = (total(c, optics(0.5, 0.4, ground=0.2)) for c in found)
@@ -253,7 +256,7 @@ def test_bands_summed_with_their_light_are_the_sum_of_all_bands():
 
 def test_more_paths_start_where_the_light_is_uncertain_until_it_is_not():
     sensors = np.array([[0.0, 0.0, 0.5], [400.0, 0.0, 0.5]])
-    scene, leaf = Scene({"leaf": leaf_cloud()}), optics(0.1, 0.05, ground=0.2)
+    scene, leaf = Scene(of_kinds(leaf=leaf_cloud())), optics(0.1, 0.05, ground=0.2)
     settings = {"n_paths": 512, "optics": leaf, "tolerance": 0.002}
     counted = collect(scene, sensors, **settings)
     assert counted.n_paths[0] > 4 * counted.n_paths[1]
@@ -269,7 +272,7 @@ def test_a_tolerance_without_optics_is_an_error_that_says_so():
 
 
 def test_paths_added_later_are_those_that_would_have_been_traced_at_once():
-    scene, leaf = Scene({"leaf": leaf_cloud()}), optics(0.1, 0.05, ground=0.2)
+    scene, leaf = Scene(of_kinds(leaf=leaf_cloud())), optics(0.1, 0.05, ground=0.2)
     grown = collect(scene, n_paths=512, optics=leaf, tolerance=0.002)
     at_once = collect(scene, n_paths=int(grown.n_paths[0]) * grown.n_replicates)
     assert grown.n_paths[0] > 32

@@ -15,10 +15,13 @@ from dapple.light import light_model, series
 from dapple.light.light_model import Cost, Effort, Model
 from dapple.light.visibility import Sunlit
 from dapple.scene import traced
-from dapple.scene.surfaces import Optics, Scene
+from dapple.scene.scene_optics import Optics
+from dapple.scene.surfaces import Scene, of_kinds
 
 WAVELENGTH = np.linspace(400, 700, 7)
-OPTICS = Optics(WAVELENGTH, *(np.linspace(low, low + 0.1, 7) for low in (0.05, 0.02, 0.15, 0.1)))
+OPTICS = Optics.of_tree(
+    WAVELENGTH, *(np.linspace(low, low + 0.1, 7) for low in (0.05, 0.02, 0.15, 0.1))
+)
 
 
 def sky_at(minutes):
@@ -95,7 +98,7 @@ def test_a_full_model_keeps_sky_and_spectra_as_they_are():
         sky, OPTICS, Model(bands=7, sky="isotropic", ground="black")
     )
     assert not plain["perez"].any()
-    assert not black.ground_reflectance.any()
+    assert not black.reflectance["ground"].any()
 
 
 # What refinements change
@@ -104,7 +107,9 @@ def test_a_full_model_keeps_sky_and_spectra_as_they_are():
 def test_under_an_open_sky_no_refinement_changes_the_light():
     one = a_pilot()
     # a leaf far below the horizon's reach: the scene needs something to be traced
-    scene = traced.load(Scene({"leaf": square(-0.5, 0.01, x_m=50.0)}, None, 0.0), "llvm_ad_mono")
+    scene = traced.load(
+        Scene(of_kinds(leaf=square(-0.5, 0.01, x_m=50.0)), None, 0.0), "llvm_ad_mono"
+    )
     effects, finest = refinements.model_effects(one, scene)
     assert finest.par == pytest.approx(np.tile(one.open_sky, (2, 1)), rel=1e-4)
     assert {effect.refinement for effect in effects} == set(refinements.LEVELS)
@@ -116,7 +121,7 @@ def test_under_an_open_sky_no_refinement_changes_the_light():
 
 def test_under_a_leaf_scattering_and_the_edge_of_its_shade_count():
     one = a_pilot(minutes=range(0, 181, 20))
-    scene = traced.load(Scene({"leaf": square(2.0, 0.5, y_m=-1.3)}, None, 0.0), "llvm_ad_mono")
+    scene = traced.load(Scene(of_kinds(leaf=square(2.0, 0.5, y_m=-1.3)), None, 0.0), "llvm_ad_mono")
     effects = refinements.model_effects(one, scene)[0]
     by_level = {(effect.refinement, effect.level): effect for effect in effects}
     # light that is left out is missing

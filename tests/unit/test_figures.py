@@ -10,7 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from dapple.errors import InputError
 from dapple.figures import boxplot, daily_courses, ground_map, painter, scatter, style, tree
 from dapple.formats.meshes import Mesh
-from dapple.scene.surfaces import Scene
+from dapple.scene.surfaces import Scene, of_kinds
 
 TIMES = pd.date_range("2023-08-10 10:00", periods=30, freq="min", tz="UTC")
 
@@ -103,8 +103,8 @@ def colour_at(figure, axes, x, y):
 
 
 FIGURES = {
-    "tree": lambda: tree.draw(Scene({"leaf": square((0, 0, 3), 2)}), sensors=sensors()),
-    "voxels": lambda: tree.draw(Scene({}, voxels()), scan_positions_m=np.array([[9.0, 0, 1.5]])),
+    "tree": lambda: tree.draw(Scene(of_kinds(leaf=square((0, 0, 3), 2))), sensors=sensors()),
+    "voxels": lambda: tree.draw(Scene((), voxels()), scan_positions_m=np.array([[9.0, 0, 1.5]])),
     "series": lambda: daily_courses.draw(
         records(), ["1_1", "2_1"], timezone="Europe/Berlin", per_sensor=per_sensor()
     ),
@@ -167,7 +167,7 @@ def test_triangles_that_cross_are_each_in_front_on_their_side():
 
 
 def test_the_upper_leaf_hides_the_lower_wood_from_above():
-    scene = Scene({"wood": square((0, 0, 1), 2), "leaf": square((0, 0, 3), 2, half_m=0.5)})
+    scene = Scene(of_kinds(wood=square((0, 0, 1), 2), leaf=square((0, 0, 3), 2, half_m=0.5)))
     figure = tree.draw(scene)
     red, green, _ = colour_at(figure, figure.axes[1], 0, 0)
     assert green > red  # leaf
@@ -176,7 +176,7 @@ def test_the_upper_leaf_hides_the_lower_wood_from_above():
 
 
 def test_what_stands_in_the_south_is_nearer_in_the_view_from_the_south():
-    scene = Scene({"leaf": square((0, 2, 2), 1), "wood": square((0, -2, 2), 1, half_m=0.5)})
+    scene = Scene(of_kinds(leaf=square((0, 2, 2), 1), wood=square((0, -2, 2), 1, half_m=0.5)))
     figure = tree.draw(scene)
     red, green, _ = colour_at(figure, figure.axes[0], 0, 2)
     assert red > green
@@ -185,7 +185,7 @@ def test_what_stands_in_the_south_is_nearer_in_the_view_from_the_south():
 
 
 def test_both_views_of_a_tree_have_one_scale():
-    figure = tree.draw(Scene({"leaf": square((0, 0, 3), 2), "wood": square((0, 0, 2), 1)}))
+    figure = tree.draw(Scene(of_kinds(leaf=square((0, 0, 3), 2), wood=square((0, 0, 2), 1))))
     scales = [
         np.diff(axes.transData.transform([(0, 0), (1, 1)]), axis=0)[0] for axes in figure.axes
     ]
@@ -193,7 +193,7 @@ def test_both_views_of_a_tree_have_one_scale():
 
 
 def test_voxels_add_up_along_the_line_of_sight_and_the_unknown_is_told_apart():
-    figure = tree.draw(Scene({}, voxels()))
+    figure = tree.draw(Scene((), voxels()))
     unknown, squares = figure.axes[0].collections[-2:]
     area = squares.get_array().reshape(4, 2)
     assert area[1, 0] == pytest.approx(3.0)
@@ -203,7 +203,7 @@ def test_voxels_add_up_along_the_line_of_sight_and_the_unknown_is_told_apart():
 
 
 def test_a_scanner_beyond_the_frame_is_marked_from_above_only_and_within_it():
-    scene = Scene({"leaf": square((0, 0, 3), 2)})
+    scene = Scene(of_kinds(leaf=square((0, 0, 3), 2)))
     side, above = tree.draw(scene, scan_positions_m=np.array([[30.0, 0.0, 1.5]])).axes
     assert len(side.collections) == 0
     (x, y), limit = above.collections[0].get_offsets()[0], above.get_xlim()[1]

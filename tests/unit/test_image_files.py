@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 
 from dapple.errors import InputError
-from dapple.formats.meshes import Mesh
 from dapple.retrieval import coefficient_files as files
 from dapple.retrieval import comparison
 from dapple.retrieval.coefficients import Coefficients, Window
 from dapple.retrieval.semiless import Fitted
-from dapple.scene.surfaces import Scene
+from dapple.scene.counters import Counters
 
 WINDOW = Window(-2.5, 7.0, 0.5, 6, 8)
 
@@ -28,6 +27,7 @@ def some_coefficients():
         max_orders=100,
         cut_weight=0.0,
         sun_cosine=0.5,
+        counters=Counters(("leaf",), ("wood", "ground")),
     )
 
 
@@ -36,6 +36,7 @@ def test_coefficients_come_back_as_they_were(tmp_path):
     files.write(tmp_path / "a.nc", whole)
     again = files.read(tmp_path / "a.nc")
     assert again.window == WINDOW
+    assert again.counters == whole.counters
     assert (again.cell_m, again.n_paths, again.max_orders) == (1.5, 64, 100)
     for name in ("table", "orders", "values", "light", "cells"):
         one, other = getattr(again, name), getattr(whole, name)
@@ -86,9 +87,3 @@ def test_noise_is_told_apart_from_error():
     table = comparison.compare(biased, reference, ("840",)).set_index("scale")
     assert table.loc["cell", "rmse_beyond_noise"] == pytest.approx(0.02, rel=0.05)
     assert table.loc["image", "bias"] == pytest.approx(0.02, rel=0.06)
-
-
-def test_a_mesh_of_an_unknown_kind_is_an_error():
-    mesh = Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32), np.zeros(0, np.int32))
-    with pytest.raises(InputError, match="ground"):
-        Scene({"water": mesh}).check_kinds()

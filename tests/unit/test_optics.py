@@ -103,8 +103,8 @@ def test_a_spectrum_file_that_is_missing_or_foreign_is_refused(tmp_path):
 
 def test_the_optics_of_a_scene_have_one_value_per_band_and_kind():
     optics = scene_optics.from_spectra(leaf={"n": 1.8}, bark=0.2)
-    for name in ("leaf_reflectance", "leaf_transmittance", "ground_reflectance"):
-        values = getattr(optics, name)
+    of_leaf = optics.reflectance["leaf"], optics.transmittance["leaf"]
+    for values in (*of_leaf, optics.reflectance["ground"]):
         assert values.shape == (61,)
         assert ((values > 0) & (values < 0.3)).all()
-    assert optics.bark_reflectance == pytest.approx(0.2)
+    assert optics.reflectance["wood"] == pytest.approx(0.2)

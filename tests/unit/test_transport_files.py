@@ -8,6 +8,7 @@ from dapple.errors import InputError
 from dapple.formats import netcdf
 from dapple.light import transport_files as files
 from dapple.light.tensor import Transport
+from dapple.scene.counters import Counters
 
 
 def traced(rows=50):
@@ -22,6 +23,7 @@ def traced(rows=50):
         n_paths=np.array([64, 128, 64]),
         cut=np.array([0, 3, 1]),
         max_orders=250,
+        counters=Counters(("leaf",), ("wood", "ground")),
     )
 
 

@@ -13,7 +13,7 @@ from dapple.frames import direction_from_angles
 from dapple.light import light_model, series, visibility
 from dapple.light.light_model import PARTS, Cost, Effort, Model
 from dapple.light.series import Light
-from dapple.scene.surfaces import Optics
+from dapple.scene.scene_optics import Optics
 from dapple.scene.traced import TracedScene
 from dapple.sky.sun import position
 

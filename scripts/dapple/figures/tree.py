@@ -1,5 +1,6 @@
 """The reconstructed tree from the side and from above, with sensors and scan positions."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,12 +13,11 @@ from matplotlib.patches import Rectangle
 
 from dapple.figures import painter, style
 from dapple.formats.meshes import Mesh
-from dapple.scene.surfaces import Scene
+from dapple.scene.surfaces import Scene, Surface
 
 PANEL_IN = 4.0  # width of one view
 HAZE = 0.35
 UNKNOWN = "#E9E9EE"
-KIND_COLOURS = {"leaf": style.LEAF, "wood": style.WOOD}
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def draw(
         )
         axes.set_title(f"{title}, {view.title}" if title else view.title)
         axes.set_axisbelow(True)
-        _mesh_layer(axes, scene.meshes, view, low, high)
+        _mesh_layer(axes, scene.surfaces, view, low, high)
         if scene.voxels is not None:
             squares = _voxel_layer(axes, scene.voxels, view, norm)
         _points(axes, view, sensors, scan_positions_m, low, high)
@@ -118,7 +118,7 @@ def _panels(extent_m: np.ndarray, with_bar: bool) -> tuple[Figure, list[Axes], A
 
 def _bounds(scene: Scene, sensors: pd.DataFrame | None) -> tuple[np.ndarray, np.ndarray]:
     """Corners of the box around meshes, known leaf voxels and sensors."""
-    boxes = [mesh.vertices_m for mesh in scene.meshes.values() if len(mesh.vertices_m)]
+    boxes = [surface.mesh.vertices_m for surface in scene.filled]
     if scene.voxels is not None:
         filled = _density(scene.voxels)
         half = 0.5 * scene.voxels.attrs["voxel_size_m"]
@@ -136,14 +136,15 @@ def _bounds(scene: Scene, sensors: pd.DataFrame | None) -> tuple[np.ndarray, np.
     return points.min(axis=0), points.max(axis=0)
 
 
-def _mesh_layer(axes: Axes, meshes: dict[str, Mesh], view: View, low, high) -> None:
+def _mesh_layer(axes: Axes, surfaces: Sequence[Surface], view: View, low, high) -> None:
     """All triangles of all kinds in one picture, so that near leaves hide far branches."""
     page = [view.across, view.up]
     corners, colours = [np.empty((0, 3, 3))], [np.empty((0, 3))]
-    for kind, mesh in meshes.items():
+    for surface in surfaces:
+        mesh = surface.mesh
         triangles = mesh.vertices_m[mesh.faces][:, :, [*page, view.depth]]
         triangles[:, :, 2] *= view.nearer
-        rgb = _shaded(mesh, to_rgb(KIND_COLOURS.get(kind, "#888888")), view)
+        rgb = _shaded(mesh, to_rgb(style.LEAF if surface.is_leaf else style.WOOD), view)
         # Far parts fade towards white, which tells front from back without a third axis.
         limits = np.sort(view.nearer * np.array([low[view.depth], high[view.depth]]))
         nearness = (triangles[:, :, 2].mean(axis=1) - limits[0]) / np.ptp(limits)

@@ -1,9 +1,9 @@
 """What a canopy sends back to the sky: bidirectional reflectance factors, fluxes and images.
 
 Paths start at a view and run backward; at every leaf or surface that they meet a shadow ray asks
-whether the sun lights it. As in `light.paths` they only count leaf reflections a, leaf
-transmissions b, bark reflections c and ground reflections d: what a view receives is a power
-series in rho, tau, rho_bark and rho_ground whose coefficients are traced once for all bands.
+whether the sun lights it. As in `light.paths` they only count what they met: what a view receives
+is a power series in reflectances and transmittances whose coefficients are traced once for all
+bands.
 """
 
 from collections.abc import Iterator
@@ -11,10 +11,11 @@ from dataclasses import dataclass
 
 import drjit as dr
 import numpy as np
+import pandas as pd
 
-from dapple.light.paths import PLASTIC_STEPS, scatter
-from dapple.light.tensor import spectral_factor
-from dapple.scene.surfaces import Optics
+from dapple.light.paths import PLASTIC_STEPS, event, scatter
+from dapple.scene.counters import Counters
+from dapple.scene.scene_optics import Optics
 from dapple.scene.traced import TracedScene
 
 PATHS_PER_KERNEL = 1 << 19
@@ -54,14 +55,16 @@ class Received:
         Which view, which independent set of paths.
     source : (k,) int8
         `SUN` or `SKY`.
-    orders : (k, 4) uint8
-        Leaf reflections, leaf transmissions, bark and ground reflections.
+    orders : (k, n) uint8
+        What paths met, a column for each of `counters`.
     weight : (k,) float64
-        Reflectance factor per 2^(a + b) ρ^a τ^b ρ_bark^c ρ_ground^d.
+        Reflectance factor per `Counters.spectral_factor`.
     n_views, n_replicates : int
         How many there are.
     cut_share : float
         Share of paths given up at `max_orders`.
+    counters : Counters
+        What is counted.
     """
 
     view: np.ndarray
@@ -72,6 +75,7 @@ class Received:
     n_views: int
     n_replicates: int
     cut_share: float
+    counters: Counters
 
 
 def over_cell(
@@ -130,7 +134,7 @@ def collect(
     n_paths : int
         Of each view, in equal parts for every replicate.
     max_orders : int
-        Most surfaces on a path, at most 250.
+        Most surfaces on a path, at most 250; less in scenes of many kinds of surfaces.
     seed : int
         Of the random numbers.
     halved_after : int or None
@@ -143,30 +147,30 @@ def collect(
     Received
         The same for the same seed, whatever the number of threads.
     """
+    scene.counters.check(max_orders)
     n_views, per_set = len(views.axis), -(-n_paths // n_replicates)
     limits = max_orders, max_orders + 1 if halved_after is None else halved_after
-    keys, sums, cut = [], [], 0
+    parts, cut = [], 0
     total = n_views * n_replicates * per_set
     for low in range(0, total, PATHS_PER_KERNEL):
         n = min(PATHS_PER_KERNEL, total - low)
         found, lost = _trace_block(
             scene, views, sun_direction, low, n, per_set, n_replicates, *limits, seed
         )
-        key, weight = _summed(*found)
-        keys.append(key)
-        sums.append(weight)
+        parts.append(_summed(*found))
         cut += lost
-    key, weight = _summed(np.concatenate(keys), np.concatenate(sums))
-    start, source = np.divmod(key >> 32, 2)
+    start, orders, weight = _summed(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+    start, source = np.divmod(start, 2)
     return Received(
         view=(start // n_replicates).astype(np.int32),
         replicate=(start % n_replicates).astype(np.int32),
         source=source.astype(np.int8),
-        orders=(key & 0xFFFFFFFF).astype("<u4").view(np.uint8).reshape(-1, 4),
+        orders=scene.counters.unpacked(orders),
         weight=weight / per_set,
         n_views=n_views,
         n_replicates=n_replicates,
         cut_share=cut / total,
+        counters=scene.counters,
     )
 
 
@@ -191,26 +195,30 @@ def reflectance_factor(
         the flux through the window to that of the open sky on the level.
     """
     share = np.where(received.source == SUN, 1 - diffuse_share, diffuse_share)
-    orders = np.ascontiguousarray(received.orders)
-    kinds, kind = np.unique(orders.view("<u4").ravel(), return_inverse=True)
+    packed = received.counters.packed(received.orders)
+    kinds, kind = np.unique(packed, return_inverse=True)
     row = received.view.astype(np.int64) * received.n_replicates + received.replicate
     shape = received.n_views * received.n_replicates, len(kinds)
     table = np.bincount(row * shape[1] + kind, received.weight * share, shape[0] * shape[1])
-    factor = spectral_factor(kinds.view(np.uint8).reshape(-1, 4), optics)
+    factor = received.counters.spectral_factor(received.counters.unpacked(kinds), optics)
     values = (table.reshape(shape) @ factor).reshape(received.n_views, received.n_replicates, -1)
     return values.mean(axis=1), values.std(axis=1, ddof=1) / np.sqrt(received.n_replicates)
 
 
-def _summed(key: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Distinct keys and the sums of their weights, added in the order in which they came."""
-    distinct, place = np.unique(key, return_inverse=True)
-    return distinct, np.bincount(place, weight, len(distinct))
+def _summed(
+    start: np.ndarray, orders: np.ndarray, weight: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Distinct pairs of start and orders, and their weights added in the order of their coming."""
+    kind, kinds = pd.factorize(orders, sort=True)
+    distinct, place = np.unique(start * len(kinds) + kind, return_inverse=True)
+    start, kind = np.divmod(distinct, max(len(kinds), 1))
+    return start, kinds[kind], np.bincount(place, weight, len(distinct))
 
 
 def _trace_block(
     scene, views, sun_direction, low, n, per_set, n_replicates, max_orders, halved_after, seed
 ):
-    """Follow n paths surface by surface; keys and weights of what they bring, and how many are cut.
+    """Follow n paths; starts, orders and weights of what they bring, and how many are cut.
 
     Paths that have ended are left out after every surface: few go on for long.
     """
@@ -223,7 +231,7 @@ def _trace_block(
     rng = mi.PCG32(initstate=mi.UInt64(state), initseq=mi.UInt64(sequence))
     view = start // dr.opaque(mi.UInt32, n_replicates)
     origin, direction = _first_rays(mi, views, view, (point, shift), number, rng)
-    keys, sums, lost = [], [], 0
+    parts, lost = [], 0
     limits = max_orders, halved_after
     for whose, source, met_orders, brought in follow(
         scene, start, origin, direction, rng, sun_direction, *limits
@@ -231,9 +239,8 @@ def _trace_block(
         if source is None:
             lost = len(whose)
             break
-        keys.append((whose.astype(np.int64) * 2 + source) << 32 | met_orders)
-        sums.append(brought.astype(np.float64))
-    return (np.concatenate(keys), np.concatenate(sums)), lost
+        parts.append((whose.astype(np.int64) * 2 + source, met_orders, brought.astype(np.float64)))
+    return tuple(np.concatenate(part) for part in zip(*parts, strict=True)), lost
 
 
 def follow(
@@ -275,7 +282,7 @@ def follow(
     mi = scene.mi
     sun = mi.Vector3f(*(dr.opaque(mi.Float, float(x)) for x in sun_direction))
     n = dr.width(start)
-    orders, weight = dr.zeros(mi.UInt32, n), dr.full(mi.Float, 1.0, n)
+    orders, weight = dr.zeros(scene.word, n), dr.full(mi.Float, 1.0, n)
     for met in range(max_orders):
         thinned = dr.opaque(mi.Bool, met + 1 >= halved_after)
         brought, path = _bounce(scene, origin, direction, rng, orders, weight, sun, thinned)
@@ -327,29 +334,27 @@ def _bounce(scene, origin, direction, rng, orders, weight, sun, thinned):
     """
     mi = scene.mi
     active = dr.full(mi.Bool, True, dr.width(weight))
-    point, normal, leaf, voxel, bark, ground = scene.meet(origin, direction, rng, active)
-    event = leaf | bark | ground
+    point, normal, counter, hit, leaf, voxel = scene.meet(origin, direction, rng, active)
     towards = dr.dot(normal, sun)
     same_side = towards > 0
     push = dr.select(voxel, 0.0, scene.ray_offset)
     start = point + dr.select(same_side, normal, -normal) * push
-    lit = event & (same_side | leaf)
+    lit = hit & (same_side | leaf)
     sunlight = scene.transmittance(start, mi.Vector3f(sun), lit, coherent=False)
     sunlight *= dr.abs(towards) / sun.z
-    # Light on a leaf goes either way for certain, without the chance that 2^(a + b) undoes.
+    # Light on a leaf goes either way for certain, without the chance that the factor 2 undoes.
     sunlight *= dr.select(leaf, 0.5, 1.0)
-    reflects, others = dr.select(same_side, 1, 1 << 8), dr.select(bark, 1 << 16, 1 << 24)
-    met = orders + mi.UInt32(dr.select(leaf, reflects, others))
-    from_sky = ~event & (direction.z > 0)
+    met = orders + event(scene, counter, leaf & ~same_side)
+    from_sky = ~hit & (direction.z > 0)
     brought = (
-        weight * dr.select(event, sunlight, dr.select(from_sky, 1.0, 0.0)),
-        dr.select(event, mi.UInt32(SUN), mi.UInt32(SKY)),
-        dr.select(event, met, orders),
+        weight * dr.select(hit, sunlight, dr.select(from_sky, 1.0, 0.0)),
+        dr.select(hit, mi.UInt32(SUN), mi.UInt32(SKY)),
+        dr.select(hit, met, orders),
     )
     origin, direction, transmitted = scatter(mi, scene, point, normal, leaf, voxel, rng)
-    orders = orders + mi.UInt32(dr.select(leaf, dr.select(transmitted, 1 << 8, 1), others))
+    orders = orders + event(scene, counter, transmitted)
     ends = thinned & (rng.next_float32() < 0.5)
     weight = dr.select(thinned, 2 * weight, weight)
-    path = (origin, direction, rng, orders, weight, event & ~ends)
+    path = (origin, direction, rng, orders, weight, hit & ~ends)
     dr.eval(*brought, *path)
     return brought, path

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,8 @@ from dapple.formats.netcdf import times
 from dapple.light import series, transport, visibility
 from dapple.light.series import Light
 from dapple.light.visibility import Sunlit
-from dapple.scene.surfaces import Optics, group_bands, group_flux
+from dapple.scene.scene_optics import Optics, group_bands, group_flux
+from dapple.scene.surfaces import GROUND
 from dapple.scene.traced import TracedScene
 from dapple.streams import stream_seed
 
@@ -133,7 +134,7 @@ def simplified(sky: xr.Dataset, optics: Optics, model: Model) -> tuple[xr.Datase
     if model.sky == "isotropic":
         sky = sky.assign(perez=xr.zeros_like(sky["perez"]))
     if model.ground == "black":
-        optics = replace(optics, ground_reflectance=np.zeros(len(optics)))
+        optics = optics.with_black(GROUND)
     if model.bands < len(optics):
         flux = {name: sky[name].transpose("time", "band").to_numpy() for name in FLUXES}
         optics, group = group_bands(optics, *flux.values(), model.bands)

@@ -1,9 +1,9 @@
 """Backward light paths through meshes and turbid voxels: one Dr.Jit kernel for every scene.
 
 A path starts at a sensor and ends when it leaves the scene. On its way it only counts what it met:
-leaf reflections a, leaf transmissions b, bark reflections c, ground reflections d. Each leaf event
-reflects or transmits with equal chance, so that a path stands for 2^(a + b) times its own share of
-light, times rho^a tau^b rho_bark^c rho_ground^d in any band: spectra come later.
+reflections and transmissions by each kind of leaf, reflections by wood, ground and all else. At a
+leaf it goes on to either side with equal chance. `Counters.spectral_factor` says what share of
+light is left of it in any band: spectra come later.
 """
 
 from dataclasses import dataclass
@@ -29,8 +29,8 @@ class Paths:
         Index of the point where each path started.
     direction : (m, 3) float32
         Unit vector in which it left: its light came from there.
-    orders : (m, 4) uint8
-        Leaf reflections, leaf transmissions, bark and ground reflections on its way.
+    orders : (m,) uint32 or uint64
+        What it met on its way, packed by the scene's `counters`.
     weight : (m,) int64
         Paths that it stands for: a power of two, 1 without random termination.
     cut : (n,) int64
@@ -66,7 +66,8 @@ def trace(
     n_paths : (n,) int64
         Paths from each point; their first directions follow a shifted R2 sequence.
     max_orders : int
-        A path that meets more surfaces is given up (and counted as cut), at most 255.
+        A path that meets more surfaces is given up (and counted as cut); at most 255, less in
+        scenes of many kinds of surfaces (`Counters.check`).
     seed : int
         Of the random numbers. A path depends on it, its point's index and its own number, not on
         the number of threads nor on how many paths are traced.
@@ -83,6 +84,7 @@ def trace(
         In order of point and path.
     """
     mi = scene.mi
+    scene.counters.check(max_orders)
     n_paths = np.broadcast_to(n_paths, len(points_m)).astype(np.int64)
     first = np.broadcast_to(first, len(points_m)).astype(np.int64)
     ends = np.cumsum(n_paths)
@@ -119,7 +121,7 @@ def _trace_block(scene, points, start, number, seed, max_orders, halved_after, r
     on_disc = mi.warp.square_to_uniform_disk(mi.Point2f(rng.next_float32(), rng.next_float32()))
     centre = mi.Point3f(*(dr.gather(mi.Float, axis, start) for axis in points))
     origin = centre + radius * mi.Vector3f(on_disc.x, on_disc.y, 0)
-    direction, escaped, alive, weight, *orders = _follow(
+    direction, escaped, alive, weight, orders = _follow(
         mi,
         scene,
         origin,
@@ -130,18 +132,15 @@ def _trace_block(scene, points, start, number, seed, max_orders, halved_after, r
         halved_after,
     )
     kept = dr.compress(escaped | alive)
-    packed = orders[0] | orders[1] << 8 | orders[2] << 16 | orders[3] << 24
-    columns = [dr.gather(mi.UInt32, column, kept) for column in (start, packed, weight)]
-    direction = dr.gather(mi.Vector3f, direction, kept)
-    escaped = dr.gather(mi.Bool, escaped, kept)
-    dr.eval(columns, direction, escaped)
-    start, packed, weight = (np.array(column) for column in columns)
+    columns = [dr.gather(type(x), x, kept) for x in (start, direction, orders, weight, escaped)]
+    dr.eval(columns)
+    start, direction, orders, weight, escaped = (np.array(column) for column in columns)
     return (
         start.astype(np.int32),
-        np.ascontiguousarray(np.array(direction).T, np.float32),
-        packed[:, None].astype("<u4").view(np.uint8).reshape(-1, 4),
+        np.ascontiguousarray(direction.T, np.float32),
+        orders.astype(scene.counters.word),
         weight.astype(np.int64),
-        ~np.array(escaped),
+        ~escaped,
     )
 
 
@@ -173,33 +172,35 @@ def scatter(mi, scene, point, normal, leaf, voxel, rng):
     return point + side * push, direction, transmitted
 
 
+def event(scene, counter, transmitted):
+    """One more of what a counter counts, or the next one where a leaf let light through."""
+    counter = dr.select(transmitted, counter + 1, counter)
+    return scene.word(1) << scene.word(counter * scene.counters.bits)
+
+
 @dr.syntax
 def _follow(mi, scene, origin, direction, rng, active, max_orders, halved_after):
     """Follow paths until they leave the scene; return last directions and what they met."""
-    a, b, c, d = mi.UInt32(0), mi.UInt32(0), mi.UInt32(0), mi.UInt32(0)
-    met, weight = mi.UInt32(0), mi.UInt32(1)
+    orders, met, weight = scene.word(0), mi.UInt32(0), mi.UInt32(1)
     escaped, cut = mi.Bool(False), mi.Bool(False)
     while dr.hint(active, mode="evaluated", compress=True):
-        point, normal, leaf, voxel, bark, ground, crossed = scene.segment(
+        point, normal, counter, hit, leaf, voxel, crossed = scene.segment(
             origin, direction, rng, active
         )
-        event = active & (leaf | bark | ground)
-        escaped |= active & ~event & ~crossed
+        hit &= active
+        escaped |= active & ~hit & ~crossed
         new_origin, new_direction, transmitted = scatter(mi, scene, point, normal, leaf, voxel, rng)
-        a += dr.select(event & leaf & ~transmitted, 1, 0)
-        b += dr.select(event & transmitted, 1, 0)
-        c += dr.select(event & bark, 1, 0)
-        d += dr.select(event & ground, 1, 0)
-        met += dr.select(event, 1, 0)
-        origin[event] = new_origin
-        direction[event] = new_direction
+        orders[hit] = orders + event(scene, counter, transmitted)
+        met += dr.select(hit, 1, 0)
+        origin[hit] = new_origin
+        direction[hit] = new_direction
         origin[active & crossed] = point
-        active &= event | crossed
+        active &= hit | crossed
         cut |= active & (met > max_orders)
         active &= ~cut
         # Weights stay powers of two, so that sums of them stay integers.
-        thinned = active & event & (met >= halved_after)
+        thinned = active & hit & (met >= halved_after)
         dies = thinned & (rng.next_float32() < 0.5)
         weight[thinned] = weight * 2
         active &= ~dies
-    return direction, escaped, cut, weight, a, b, c, d
+    return direction, escaped, cut, weight, orders

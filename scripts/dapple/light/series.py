@@ -10,7 +10,7 @@ from dapple.formats.netcdf import time_coordinate, times
 from dapple.frames import direction_from_angles
 from dapple.light.tensor import Transport, straight, summed_scattered, sun_radiance
 from dapple.light.visibility import Sunlit
-from dapple.scene.surfaces import Optics
+from dapple.scene.scene_optics import Optics
 from dapple.sky.patches import patches
 from dapple.sky.sky_radiance import patch_radiance
 

@@ -13,7 +13,8 @@ import numpy as np
 from scipy import sparse
 
 from dapple.frames import direction_from_angles
-from dapple.scene.surfaces import Optics
+from dapple.scene.counters import Counters
+from dapple.scene.scene_optics import Optics
 from dapple.sky.patches import Patches, patches
 
 NOMINAL_SUNS_DEG = ((30, 0), (30, 120), (30, 240), (60, 60), (60, 180), (60, 300))
@@ -35,8 +36,8 @@ class Transport:
         replicates; with voxels the transmittance.
     sensor, replicate, patch : (k,) int32
         Where a path started, in which independent set, and in which sky patch it left.
-    orders : (k, 4) uint8
-        Leaf reflections a, leaf transmissions b, bark and ground reflections; never all 0.
+    orders : (k, n) uint8
+        What they met, a column for each of `counters`; never all 0.
     count : (k,) int64
         Paths of this kind.
     n_paths : (n_sensors,) int64
@@ -45,6 +46,8 @@ class Transport:
         Paths that were given up at `max_orders`, of all replicates.
     max_orders : int
         Most surfaces on a path.
+    counters : Counters
+        What is counted.
     """
 
     sky_seen: np.ndarray
@@ -56,6 +59,7 @@ class Transport:
     n_paths: np.ndarray
     cut: np.ndarray
     max_orders: int
+    counters: Counters
 
     @property
     def n_replicates(self) -> int:
@@ -72,8 +76,7 @@ class Transport:
 
         An upper bound: every surface that a lost path met sends on at most the largest albedo.
         """
-        leaf = optics.leaf_reflectance + optics.leaf_transmittance
-        albedo = max(x.max() for x in (leaf, optics.bark_reflectance, optics.ground_reflectance))
+        albedo = self.counters.largest_albedo(optics)
         return self.cut / (self.n_paths * self.n_replicates) * albedo**self.max_orders
 
 
@@ -136,35 +139,6 @@ def _nominal_skies(sky: Patches) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return even, 0.5 * NOMINAL_DIFFUSE_SHARE * (even + around), suns
 
 
-def spectral_factor(orders: np.ndarray, optics: Optics) -> np.ndarray:
-    """What is left of light after the events of a path.
-
-    Parameters
-    ----------
-    orders : (k, 4) uint8
-        Leaf reflections, leaf transmissions, bark and ground reflections.
-    optics : Optics
-        In b bands.
-
-    Returns
-    -------
-    (k, b) float64
-        2^(a + b) ρ^a τ^b ρ_bark^c ρ_ground^d; the powers of two undo the even choice between
-        reflection and transmission.
-    """
-    bases = (
-        2 * optics.leaf_reflectance,
-        2 * optics.leaf_transmittance,
-        optics.bark_reflectance,
-        optics.ground_reflectance,
-    )
-    factor = np.ones((len(orders), len(optics)))
-    for column, base in enumerate(bases):
-        powers = base ** np.arange(orders[:, column].max(initial=0) + 1)[:, None]
-        factor *= powers[orders[:, column]]
-    return factor
-
-
 def straight(transport: Transport, radiance: np.ndarray) -> np.ndarray:
     """Irradiance at the sensors straight from a sky.
 
@@ -211,7 +185,7 @@ def scattered(transport: Transport, radiance: np.ndarray, optics: Optics) -> np.
     """
     result = np.zeros((*transport.sky_seen.shape[:2], len(radiance), len(optics)))
     kinds, pieces = _by_kind(transport, radiance)
-    factor = spectral_factor(kinds, optics)
+    factor = transport.counters.spectral_factor(kinds, optics)
     for sensor, mine, light in pieces:
         result[sensor] = np.einsum("rkt,kb->rtb", light, factor[mine], optimize=True)
     return result
@@ -236,18 +210,18 @@ def summed_scattered(
     """
     result = np.zeros((*transport.sky_seen.shape[:2], len(radiance)))
     kinds, pieces = _by_kind(transport, radiance)
-    passed = spectral_factor(kinds, optics) @ flux.T
+    passed = transport.counters.spectral_factor(kinds, optics) @ flux.T
     for sensor, mine, light in pieces:
         result[sensor] = np.einsum("rkt,kt->rt", light, passed[mine])
     return result
 
 
 def _by_kind(transport: Transport, radiance: np.ndarray):
-    """Kinds of paths (k, 4), and for each sensor which it has and the sky's light along them.
+    """Kinds of paths (k, n), and for each sensor which it has and the sky's light along them.
 
     The second is an iterator over sensor, kinds (m,) and light (r, m, t).
     """
-    packed = np.ascontiguousarray(transport.orders).view("<u4").ravel()
+    packed = transport.counters.packed(transport.orders)
     kinds, kind = np.unique(packed, return_inverse=True)
     bounds = np.searchsorted(transport.sensor, np.arange(len(transport.n_paths) + 1))
     by_patch = np.ascontiguousarray(radiance.T)
@@ -265,7 +239,7 @@ def _by_kind(transport: Transport, radiance: np.ndarray):
             )
             yield sensor, mine, (counted @ by_patch).reshape(n_replicates, len(mine), -1)
 
-    return kinds.astype("<u4").view(np.uint8).reshape(-1, 4), pieces()
+    return transport.counters.unpacked(kinds), pieces()
 
 
 def sun_radiance(sun_directions: np.ndarray, sky: Patches, *, kernel_deg: float) -> np.ndarray:

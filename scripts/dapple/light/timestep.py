@@ -21,7 +21,7 @@ from dapple import engine
 from dapple.errors import InputError
 from dapple.frames import direction_from_angles
 from dapple.scene import patterns
-from dapple.scene.mitsuba_scene import RenderScene
+from dapple.scene.render_scene import RenderScene
 from dapple.sky.sky_radiance import relative_radiance
 from dapple.streams import stream_seed
 

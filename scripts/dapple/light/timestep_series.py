@@ -13,7 +13,9 @@ from dapple.formats import netcdf
 from dapple.light.series import dataset
 from dapple.light.timestep import Effort, timestep
 from dapple.scene import mitsuba_scene
-from dapple.scene.surfaces import Optics, Scene, group_bands, group_flux
+from dapple.scene.render_scene import RenderScene
+from dapple.scene.scene_optics import Optics, group_bands, group_flux
+from dapple.scene.surfaces import Scene
 from dapple.streams import stream_seed
 
 
@@ -69,7 +71,7 @@ class Reference:
         return (self.effort, self.n_bands, self.sun_diameter_deg, self.aperture_m, self.seed)
 
     @cached_property
-    def rendered(self) -> list[mitsuba_scene.RenderScene]:
+    def rendered(self) -> list[RenderScene]:
         """The scenes as Mitsuba has them."""
         return [
             mitsuba_scene.build(
@@ -145,8 +147,9 @@ def run_all(
         common.update(Path(path).read_bytes())
     common.update(sensors.to_csv().encode())
     common.update(repr(reference.settings).encode())
-    for values in vars(reference.optics).values():
-        common.update(np.ascontiguousarray(values).tobytes())
+    for kind in (reference.optics.reflectance, reference.optics.transmittance):
+        for name, values in kind.items():
+            common.update(name.encode() + np.ascontiguousarray(values).tobytes())
     computed = 0
     for index, path in enumerate(paths):
         digest = common.copy()

@@ -7,12 +7,14 @@ from collections.abc import Callable
 from dataclasses import fields
 
 import numpy as np
+import pandas as pd
 
 from dapple.errors import InputError
 from dapple.light.paths import Paths, trace
 from dapple.light.rays_to_sky import sky_rays
 from dapple.light.tensor import Transport, nominal_error, nominal_straight_error
-from dapple.scene.surfaces import Optics
+from dapple.scene.counters import Counters
+from dapple.scene.scene_optics import Optics
 from dapple.scene.traced import TracedScene
 from dapple.sky.patches import patches
 from dapple.streams import stream_seed
@@ -110,7 +112,7 @@ def collect(
             halved_after=halved_after,
             aperture_m=aperture_m,
         )
-        more = _tallied(paths, wanted - done, seen, max_orders)
+        more = _tallied(paths, scene.counters, wanted - done, seen, max_orders)
         return more if counted is None else _added(counted, more)
 
     def scattered_error(counted: Transport) -> np.ndarray:
@@ -147,28 +149,32 @@ def _grown(
     return found
 
 
-def _tallied(paths: Paths, n_paths: np.ndarray, seen: np.ndarray, max_orders: int) -> Transport:
+def _tallied(
+    paths: Paths, counters: Counters, n_paths: np.ndarray, seen: np.ndarray, max_orders: int
+) -> Transport:
     """Paths of the same start, patch and orders as one row with their number."""
     _, n_replicates, n_patches = seen.shape
-    scattered = paths.orders.any(axis=1)
+    scattered = paths.orders > 0
     patch = patches(n_patches).index(paths.direction[scattered])
-    orders = paths.orders[scattered].view("<u4").ravel().astype(np.int64)
+    kind, kinds = pd.factorize(paths.orders[scattered], sort=True)
     # A path may leave a scene without ground downwards, where there is no light.
     up = patch >= 0
-    key = (paths.start[scattered].astype(np.int64) * n_patches + patch) << 32 | orders
-    key, count = _summed(key[up], paths.weight[scattered][up])
-    start, patch = np.divmod(key >> 32, n_patches)
+    place = paths.start[scattered].astype(np.int64) * n_patches + patch
+    key, count = _summed((place * len(kinds) + kind)[up], paths.weight[scattered][up])
+    place, kind = np.divmod(key, max(len(kinds), 1))
+    start, patch = np.divmod(place, n_patches)
     sensor, replicate = np.divmod(start, n_replicates)
     return Transport(
         seen,
         sensor.astype(np.int32),
         replicate.astype(np.int32),
         patch.astype(np.int32),
-        (key & 0xFFFFFFFF).astype("<u4").view(np.uint8).reshape(-1, 4),
+        counters.unpacked(kinds)[kind],
         count,
         n_paths,
         paths.cut.reshape(-1, n_replicates).sum(axis=1),
         max_orders,
+        counters,
     )
 
 
@@ -188,9 +194,9 @@ def _added(first: Transport, second: Transport) -> Transport:
         name: np.concatenate([getattr(first, name), getattr(second, name)])
         for name in ("sensor", "replicate", "patch", "orders", "count")
     }
-    orders = np.ascontiguousarray(columns["orders"]).view("<u4").ravel().astype(np.int64)
+    kind, kinds = pd.factorize(first.counters.packed(columns["orders"]), sort=True)
     start = columns["sensor"].astype(np.int64) * first.n_replicates + columns["replicate"]
-    key = (start * first.n_patches + columns["patch"]) << 32 | orders
+    key = (start * first.n_patches + columns["patch"]) * len(kinds) + kind
     _, index = np.unique(key, return_index=True)
     columns = {name: values[index] for name, values in columns.items()}
     columns["count"] = _summed(key, np.concatenate([first.count, second.count]))[1]

@@ -6,12 +6,13 @@ import xarray as xr
 
 from dapple.formats import netcdf
 from dapple.light.tensor import Transport
+from dapple.scene.counters import KINDS, Counters
 
 ROWS = {
     "sensor": "index of the sensor where the paths start",
     "replicate": "independent set of paths",
     "patch": "sky patch in which they leave",
-    "orders": "leaf reflections, leaf transmissions, bark and ground reflections on their way",
+    "orders": "counted on their way",
     "count": "paths",
 }
 SENSORS = {
@@ -37,7 +38,9 @@ def write(path: str | Path, transport: Transport) -> None:
     }
     about = {"units": "1", "long_name": SKY}
     variables["sky_seen"] = (("start", "set", "sky_patch"), transport.sky_seen, about)
-    dataset = xr.Dataset(variables, attrs={"max_orders": transport.max_orders})
+    variables["orders"][2]["long_name"] += ": " + ", ".join(transport.counters.names)
+    attributes = {"max_orders": transport.max_orders} | transport.counters.attributes
+    dataset = xr.Dataset(variables, attrs=attributes)
     compressed = {"zlib": True, "complevel": 1, "shuffle": True}
     netcdf.store(path, dataset, dict.fromkeys(variables, compressed))
 
@@ -51,6 +54,7 @@ def read(path: str | Path) -> Transport:
         No such file, or one of another kind.
     """
     names = [*ROWS, *SENSORS, "sky_seen"]
-    dataset = netcdf.read(path, names, ("max_orders",))
+    dataset = netcdf.read(path, names, ("max_orders", *KINDS))
     columns = {name: dataset[name].to_numpy() for name in names}
-    return Transport(**columns, max_orders=int(dataset.attrs["max_orders"]))
+    counters = Counters.from_attributes(dataset.attrs)
+    return Transport(**columns, max_orders=int(dataset.attrs["max_orders"]), counters=counters)

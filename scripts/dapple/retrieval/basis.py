@@ -1,6 +1,6 @@
 """A few columns instead of thousands of kinds of paths.
 
-A path that met a, b, c, d surfaces of each kind brings f = 2^(a + b) ρ^a τ^b ρ_bark^c ρ_soil^d.
+A path brings what `Counters.spectral_factor` says of what it met on leaves, wood and ground.
 For all leaves and soils that occur, these factors are nearly combinations of a few functions of
 the kind of path. The functions are found by singular value decomposition, weighted by how much
 light paths of each kind bring. The first one is 1: what a projection on the others leaves over
@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dapple.light.tensor import spectral_factor
-from dapple.scene.surfaces import Optics
+from dapple.scene.counters import Counters
+from dapple.scene.scene_optics import Optics
 
 N_NODES = 400
 LARGEST_ALBEDO, LARGEST_SOIL, LARGEST_BARK = 0.999, 0.85, 0.8
@@ -39,18 +39,21 @@ class Basis:
         What is subtracted from the factors of the nodes.
     mix : (m, r - 1) float64
         How they are combined.
+    counters : Counters
+        What paths count.
     """
 
     nodes: Optics
     middle: np.ndarray
     mix: np.ndarray
+    counters: Counters
 
     def __len__(self) -> int:
         return self.mix.shape[1] + 1
 
     def of(self, orders: np.ndarray) -> np.ndarray:
-        """Values (k, r) of the functions for kinds of paths (k, 4)."""
-        factor = spectral_factor(orders, self.nodes) - self.middle
+        """Values (k, r) of the functions for kinds of paths (k, n)."""
+        factor = self.counters.spectral_factor(orders, self.nodes) - self.middle
         return np.column_stack([np.ones(len(orders)), factor @ self.mix])
 
 
@@ -59,7 +62,7 @@ def nodes(seed: int, n: int = N_NODES) -> Optics:
     rng = np.random.default_rng(seed)
     albedo = LARGEST_ALBEDO * rng.beta(0.6, 0.5, n)
     asymmetry = rng.uniform(-1, 1, n) * (LEAST_ASYMMETRY + MORE_ASYMMETRY * (1 - albedo) ** 2)
-    return Optics(
+    return Optics.of_tree(
         np.zeros(n),
         albedo * (1 + asymmetry) / 2,
         albedo * (1 - asymmetry) / 2,
@@ -68,15 +71,19 @@ def nodes(seed: int, n: int = N_NODES) -> Optics:
     )
 
 
-def fit(orders: np.ndarray, light: np.ndarray, n_columns: int, seed: int) -> Basis:
+def fit(
+    orders: np.ndarray, light: np.ndarray, counters: Counters, n_columns: int, seed: int
+) -> Basis:
     """Find the functions that serve best for paths of which a sample is known.
 
     Parameters
     ----------
-    orders : (k, 4) uint8
+    orders : (k, n) uint8
         Kinds of paths, each once.
     light : (k,) float64
         What paths of each kind bring, above 0.
+    counters : Counters
+        What paths count.
     n_columns : int
         Number of functions r.
     seed : int
@@ -88,14 +95,14 @@ def fit(orders: np.ndarray, light: np.ndarray, n_columns: int, seed: int) -> Bas
     """
     made_for = nodes(seed)
     share = light / light.sum()
-    factor = spectral_factor(orders, made_for)
+    factor = counters.spectral_factor(orders, made_for)
     middle = share @ factor
     weighted = np.sqrt(share)[:, None] * (factor - middle)
     # Right singular vectors by way of a small matrix: there are many more kinds than nodes.
     square, ways = np.linalg.eigh(weighted.T @ weighted)
     square, ways = square[::-1], ways[:, ::-1]
     kept = min(n_columns - 1, int((square > LEAST_SQUARE * square[0]).sum()))
-    return Basis(made_for, middle, ways[:, :kept] / np.sqrt(square[:kept]))
+    return Basis(made_for, middle, ways[:, :kept] / np.sqrt(square[:kept]), counters)
 
 
 def projector(values: np.ndarray, light: np.ndarray) -> np.ndarray:

@@ -8,10 +8,11 @@ import xarray as xr
 from dapple.formats import netcdf
 from dapple.retrieval.coefficients import Coefficients, Window
 from dapple.retrieval.semiless import Fitted
+from dapple.scene.counters import KINDS, Counters
 
 TABLES = {
     "table": (("pixel", "column"), "sums of functions over the paths of each pixel, sun then sky"),
-    "orders": (("kind", "order"), "leaf reflections, leaf transmissions, bark and ground"),
+    "orders": (("kind", "order"), "what each kind of path met, counted"),
     "values": (("kind", "function"), "functions of each kind of path"),
     "light": (("source", "kind"), "reflectance factor that a kind brings to the whole image"),
     "cells": (("replicate", "cell", "column"), "means of the table over cells"),
@@ -28,6 +29,7 @@ def write(path: str | Path, coefficients: Coefficients) -> None:
         for name, (dims, text) in TABLES.items()
     }
     attributes = {name: getattr(coefficients, name) for name in NUMBERS}
+    attributes |= coefficients.counters.attributes
     _write(path, variables, coefficients.window, attributes)
 
 
@@ -39,10 +41,11 @@ def read(path: str | Path) -> Coefficients:
     InputError
         No such file, or one of another kind.
     """
-    dataset = netcdf.read(path, [*TABLES], [*NUMBERS, *WINDOW])
+    dataset = netcdf.read(path, [*TABLES], [*NUMBERS, *KINDS, *WINDOW])
     numbers = {name: dataset.attrs[name].item() for name in NUMBERS}
     tables = {name: dataset[name].to_numpy() for name in TABLES}
-    return Coefficients(window=_window(dataset), **tables, **numbers)
+    counters = Counters.from_attributes(dataset.attrs)
+    return Coefficients(window=_window(dataset), counters=counters, **tables, **numbers)
 
 
 def write_semiless(path: str | Path, fitted: Fitted) -> None:

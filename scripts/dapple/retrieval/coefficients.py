@@ -1,12 +1,12 @@
 """Images of any leaf, bark and soil from light paths that were traced once.
 
-Paths from every pixel only count what they met: leaf reflections a, leaf transmissions b, bark
-reflections c, ground reflections d (`image_paths`). The reflectance of a pixel is a power series
-in leaf reflectance, leaf transmittance, bark and soil reflectance. It takes no assumption on the
+Paths from every pixel only count what they met on leaves, wood and ground (`image_paths`). The
+reflectance of a pixel is a power series in the reflectance and transmittance of leaves and the
+reflectance of bark and soil. It takes no assumption on the
 leaf: any pair of reflectance and transmittance will do, where a series in absorption alone holds
 for one leaf structure.
 
-There are thousands of kinds (a, b, c, d). The series is kept exactly for the whole image, and per
+There are thousands of kinds of paths. The series is kept exactly for the whole image, and per
 pixel as a projection on a few functions of the kind (`basis`): the mean over all pixels has no
 approximation, single pixels have one far below the noise of their paths.
 """
@@ -18,9 +18,9 @@ from functools import cached_property
 import numpy as np
 
 from dapple.light.brf import SKY, SUN
-from dapple.light.tensor import spectral_factor
 from dapple.retrieval.basis import projector
-from dapple.scene.surfaces import Optics
+from dapple.scene.counters import Counters
+from dapple.scene.scene_optics import Optics
 
 COMBINATIONS_AT_ONCE = 1024
 """Bounds the memory of the factors of all kinds of paths."""
@@ -74,13 +74,13 @@ class Coefficients:
         The pixels.
     table : (pixels, 2 * r) float32
         Sums of the r functions over each pixel's paths, for light from the sun and from the sky.
-    orders : (k, 4) uint8
-        Leaf reflections, leaf transmissions, bark and ground reflections of every kind of path.
+    orders : (k, n) uint8
+        What every kind of path met, a column for each of `counters`.
     values : (k, r) float64
         The functions of each kind.
     light : (2, k) float64
         Reflectance factor that paths of each kind bring to the whole image under sun and sky, per
-        2^(a + b) ρ^a τ^b ρ_bark^c ρ_soil^d.
+        `Counters.spectral_factor`.
     cells : (s, n, 2 * r) float32
         Means of `table` over cells of `cell_m`, from s independent sets of paths each.
     cell_m : float
@@ -91,6 +91,8 @@ class Coefficients:
         Paths given up at `max_orders`, by their weight, as a share of all.
     sun_cosine : float
         Cosine of the sun's zenith angle.
+    counters : Counters
+        What is counted.
     """
 
     window: Window
@@ -104,6 +106,7 @@ class Coefficients:
     max_orders: int
     cut_weight: float
     sun_cosine: float
+    counters: Counters
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -203,7 +206,9 @@ def spectral_columns(
     weight = np.empty((2, coefficients.values.shape[1], len(optics)), np.float32)
     for low in range(0, len(optics), COMBINATIONS_AT_ONCE):
         part = slice(low, low + COMBINATIONS_AT_ONCE)
-        factor = spectral_factor(coefficients.orders, _part(optics, part))
+        factor = coefficients.counters.spectral_factor(
+            coefficients.orders, optics.each(lambda values, part=part: values[part])
+        )
         for source in (SUN, SKY):
             weight[source, :, part] = coefficients.projectors[source] @ factor
     weight = weight.reshape(2, -1, *shape)
@@ -231,7 +236,7 @@ def projection_error(
         Reflectance factor. Leaves far from those for which the functions were made show here.
     """
     shape, optics = _broadcast(leaf_reflectance, leaf_transmittance, bark, soil)
-    factor = spectral_factor(coefficients.orders, optics)
+    factor = coefficients.counters.spectral_factor(coefficients.orders, optics)
     share = np.broadcast_to(diffuse_share, shape).reshape(-1)
     square = np.zeros(len(optics))
     for source, part in ((SUN, 1 - share), (SKY, share)):
@@ -273,8 +278,4 @@ def remainder_bound(
 def _broadcast(*properties: np.ndarray) -> tuple[tuple[int, ...], Optics]:
     """Shape (n, b) of properties that are broadcast against each other, and they as n * b bands."""
     both = np.broadcast_arrays(*(np.atleast_2d(np.asarray(x, float)) for x in properties))
-    return both[0].shape, Optics(np.zeros(both[0].size), *(x.reshape(-1) for x in both))
-
-
-def _part(optics: Optics, rows: slice) -> Optics:
-    return Optics(*(getattr(optics, name)[rows] for name in Optics.__dataclass_fields__))
+    return both[0].shape, Optics.of_tree(np.zeros(both[0].size), *(x.reshape(-1) for x in both))

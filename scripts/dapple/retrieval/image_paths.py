@@ -10,6 +10,7 @@ from dapple.light import brf
 from dapple.light.paths import PLASTIC_STEPS
 from dapple.retrieval import basis
 from dapple.retrieval.coefficients import Coefficients, Window
+from dapple.scene.counters import Counters
 from dapple.scene.traced import TracedScene
 
 START_ABOVE_M = 1.0
@@ -65,8 +66,9 @@ def trace(
     per_set = -(-n_paths // n_replicates)
     total = per_set * n_replicates
     _check(window, sun_direction, total, max_orders)
+    scene.counters.check(max_orders)
     limits = max_orders, halved_after
-    kinds = _Kinds()
+    kinds = _Kinds(scene.counters)
     functions = _pilot(scene, window, sun_direction, limits, n_columns, seed)
     cell, n_cells = window.cells(cell_m)
     n = len(functions)
@@ -97,7 +99,7 @@ def trace(
     return Coefficients(
         window=window,
         table=table,
-        orders=_unpacked(kinds.keys[order]),
+        orders=scene.counters.unpacked(kinds.keys[order]),
         values=kinds.values(functions)[order],
         light=kinds.light[:, order] / (window.n_pixels * total),
         cells=cells.astype(np.float32),
@@ -106,14 +108,16 @@ def trace(
         max_orders=max_orders,
         cut_weight=cut / (window.n_pixels * total),
         sun_cosine=float(sun_direction[2]),
+        counters=scene.counters,
     )
 
 
 class _Kinds:
     """The kinds of paths that were met so far, and the light that they brought."""
 
-    def __init__(self):
-        self.keys = np.empty(0, np.uint32)
+    def __init__(self, counters: Counters):
+        self.counters = counters
+        self.keys = np.empty(0, counters.word)
         self.light = np.empty((2, 0))
         self._values = None
 
@@ -145,7 +149,7 @@ class _Kinds:
     def values(self, functions: basis.Basis) -> np.ndarray:
         """(k, r) the functions of all kinds met so far."""
         done = 0 if self._values is None else len(self._values)
-        new = functions.of(_unpacked(self.keys[done:]))
+        new = functions.of(self.counters.unpacked(self.keys[done:]))
         self._values = new if done == 0 else np.concatenate([self._values, new])
         return self._values
 
@@ -160,16 +164,12 @@ def _pilot(scene, window: Window, sun_direction, limits, n_columns: int, seed: i
     starts = _starts(
         scene, coarse, (0, coarse.n_pixels), PILOT_PATHS // coarse.n_pixels, 1, seed ^ 1
     )
-    kinds = _Kinds()
+    kinds = _Kinds(scene.counters)
     kinds.count(brf.follow(scene, *starts, sun_direction, *limits))
     light = kinds.light.sum(axis=0)
     order = np.argsort(kinds.keys, kind="stable")
-    return basis.fit(_unpacked(kinds.keys[order]), light[order], n_columns, seed)
-
-
-def _unpacked(key: np.ndarray) -> np.ndarray:
-    """(k, 4) uint8 orders of packed keys."""
-    return np.ascontiguousarray(key, "<u4").view(np.uint8).reshape(-1, 4)
+    orders = scene.counters.unpacked(kinds.keys[order])
+    return basis.fit(orders, light[order], scene.counters, n_columns, seed)
 
 
 def _starts(scene, window: Window, pixels, per_set: int, n_replicates: int, seed: int):

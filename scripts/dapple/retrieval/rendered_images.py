@@ -12,18 +12,11 @@ import numpy as np
 from dapple import engine
 from dapple.retrieval.coefficients import Window
 from dapple.scene import mitsuba_scene
-from dapple.scene.surfaces import Optics, Scene
+from dapple.scene.scene_optics import Optics
+from dapple.scene.surfaces import Scene
 from dapple.streams import stream_seed
 
 CHANNELS = 3
-COLOURS = {
-    "leaf_mesh.bsdf.reflectance": "leaf_reflectance",
-    "leaf_mesh.bsdf.transmittance": "leaf_transmittance",
-    "wood_mesh.bsdf.brdf_0.reflectance.value": "bark_reflectance",
-    "ground_mesh.bsdf.brdf_0.reflectance.value": "ground_reflectance",
-    "ground.bsdf.reflectance.value": "ground_reflectance",
-}
-"""Mitsuba's names of what has a colour."""
 CAMERA_ABOVE_M = 10.0
 """The camera's plane is so far above the highest plant."""
 
@@ -65,7 +58,7 @@ class Renderer:
 
     def __init__(self, scene: Scene, *, variant: str = "llvm_ad_rgb"):
         started = perf_counter()
-        grey = Optics(*np.full((5, CHANNELS), 0.2))
+        grey = Optics.of_tree(*np.full((5, CHANNELS), 0.2))
         self.loaded = mitsuba_scene.build(scene, grey, variant=variant)
         self.variant, self.top_z_m = variant, float(scene.bounds_m[1, 2])
         self.build_s = perf_counter() - started
@@ -147,14 +140,12 @@ class Renderer:
             some = np.asarray(values, float)[bands]
             return np.pad(some, (0, CHANNELS - len(some)), mode="edge")
 
+        self.loaded.set_optics(optics.each(channels))
         share = channels(diffuse_share)
         # Paths ask the sun and the sky for light as often as befits what they bring.
         sky = float(np.clip(share.mean(), 0.05, 0.95))
         parameters = mi.traverse(self.loaded.scene)
         parameters["sun.sampling_weight"], parameters["sky.sampling_weight"] = 1 - sky, sky
-        for key, name in COLOURS.items():
-            if key in parameters:
-                parameters[key] = mi.Color3f(*channels(getattr(optics, name)).tolist())
         parameters.update()
         return share
 

@@ -4,9 +4,6 @@ Mitsuba's three colour channels serve as three spectral bands. Everything stays 
 frame (x east, y north, z up); only the sky map has axes of its own, turned here.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cache
 from types import ModuleType
 from typing import Any
 
@@ -16,161 +13,13 @@ from dapple import engine
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
 from dapple.scene.mitsuba_plugins import register
-from dapple.scene.surfaces import Optics, Scene, TurbidGrid, turbid_grid
+from dapple.scene.render_scene import RenderScene, facing, grey, leaf_shares
+from dapple.scene.scene_optics import Optics
+from dapple.scene.surfaces import Scene, TurbidGrid, turbid_grid
+from dapple.scene.traced import instances
 
 SPHERICAL_G = 0.5
 """Projection of a unit of leaf area with spherical angles, in any direction (Ross 1981)."""
-
-
-@dataclass
-class RenderScene:
-    """A Mitsuba scene whose sun and sky can be set without rebuilding it.
-
-    Attributes
-    ----------
-    mi : module
-        `mitsuba` in the variant that the scene belongs to.
-    scene : mitsuba.Scene
-    n_bands : int
-        Bands in use, 1 to 3; the remaining channels repeat the last one.
-    ground_z_m : float
-    variant : str
-        Of Mitsuba.
-    sun_radius_rad : float
-        Half the angular diameter of the sun's disc.
-    sky_shape : (rows, columns)
-        Of the sky map.
-    medium : mitsuba.Medium or None
-    medium_box_m : (2, 3) float64 or None
-        Low and high corner of the box that the medium fills.
-    """
-
-    mi: ModuleType
-    scene: Any
-    n_bands: int
-    ground_z_m: float
-    variant: str
-    sun_radius_rad: float
-    sky_shape: tuple[int, int]
-    medium: Any = None
-    medium_box_m: np.ndarray | None = None
-
-    def __post_init__(self) -> None:
-        self._parameters = self.mi.traverse(self.scene)
-        self._parameters.keep(["sun.to_world", "sun.irradiance.value", "sky.data", "sky.scale"])
-
-    @property
-    def integrator(self) -> str:
-        """The name of the Mitsuba integrator that the scene needs."""
-        return "path" if self.medium is None else "volpath"
-
-    def in_medium(self, points_m: np.ndarray) -> np.ndarray:
-        """(n,) whether points lie in the box that the turbid medium fills."""
-        if self.medium_box_m is None:
-            return np.zeros(len(points_m), dtype=bool)
-        low, high = self.medium_box_m
-        return ((points_m > low) & (points_m < high)).all(axis=1)
-
-    def set_sun(self, direction: np.ndarray, beam_normal: np.ndarray) -> None:
-        """Let parallel light come from `direction` (3,) with irradiance `beam_normal` (n_bands,).
-
-        Rays do not meet this sun: it only lights what scatters. Nothing needs rebuilding.
-        """
-        beam = channels(beam_normal, self.n_bands, fill=0.0)
-        self._parameters["sun.irradiance.value"] = self.mi.Color3f(*beam.tolist())
-        self._parameters["sun.to_world"] = self.mi.Transform4f(facing(self.mi, -direction))
-        self._parameters.update()
-
-    def set_sky(
-        self,
-        relative_radiance: Callable[[np.ndarray, np.ndarray], np.ndarray],
-        diffuse_horizontal: np.ndarray,
-    ) -> None:
-        """Fill the sky map.
-
-        Parameters
-        ----------
-        relative_radiance : callable
-            Of zenith and azimuth [deg], arrays of the same shape; of any scale.
-        diffuse_horizontal : (n_bands,) array
-            Irradiance of the open sky on the level; the map is scaled to give it exactly.
-        """
-        light = channels(diffuse_horizontal, self.n_bands, fill=0.0)
-        if light.any():
-            self._fill_sky(sky_map(relative_radiance, self.sky_shape)[:, :, None] * light, 1.0)
-        else:
-            # a black map cannot be sampled: keep a bright one and scale it to nothing
-            self._fill_sky(np.ones((*self.sky_shape, 3)), 0.0)
-
-    def set_even_sky(self, radiance: np.ndarray) -> None:
-        """Give all directions, those below the horizon too, the same radiance (n_bands,)."""
-        light = channels(radiance, self.n_bands, fill=0.0)
-        self._fill_sky(np.broadcast_to(light, (*self.sky_shape, 3)), 1.0)
-
-    def _fill_sky(self, radiance: np.ndarray, scale: float) -> None:
-        # Mitsuba's map repeats its first column at the end
-        closed = np.concatenate([radiance, radiance[:, :1]], axis=1)
-        self._parameters["sky.data"] = self.mi.TensorXf(closed.astype(np.float32))
-        self._parameters["sky.scale"] = self.mi.Float(scale)
-        self._parameters.update()
-
-
-def channels(values: np.ndarray, n_bands: int, fill: float | None = None) -> np.ndarray:
-    """Fill (n_bands,) values up to three channels, with `fill` or the last value."""
-    values = np.atleast_1d(np.asarray(values, dtype=np.float64))
-    if values.shape != (n_bands,):
-        raise InputError(
-            "bands",
-            f"values of shape {values.shape}",
-            f"one value for each of the {n_bands} bands of the scene",
-            "Sum the bands with scene.group_flux first.",
-        )
-    last = values[-1] if fill is None else fill
-    return np.concatenate([values, np.full(3 - n_bands, last)])
-
-
-def sky_map(
-    relative_radiance: Callable[[np.ndarray, np.ndarray], np.ndarray], shape: tuple[int, int]
-) -> np.ndarray:
-    """Radiance on a grid of directions, scaled to unit irradiance on the level.
-
-    Parameters
-    ----------
-    relative_radiance : callable
-        Of zenith and azimuth [deg].
-    shape : (rows, columns)
-        Rows run from the zenith to the nadir, both included; an odd number of them puts one on
-        the horizon. Columns run clockwise from half a column east of north.
-
-    Returns
-    -------
-    (rows, columns) float64
-        0 below the horizon. The light that the interpolation leaks into the first row below it
-        meets the ground from beneath.
-    """
-    rows, columns = shape
-    zenith = np.linspace(0.0, np.pi, rows)
-    up = zenith <= 0.5 * np.pi + 1e-9
-    azimuth_deg = (np.arange(columns) + 0.5) * 360.0 / columns
-    # skies go as exp(b / cos zenith): the horizon itself is a limit
-    zenith_deg = np.minimum(np.degrees(zenith[up]), 89.99)
-    radiance = np.zeros(shape)
-    radiance[up] = relative_radiance(*np.meshgrid(zenith_deg, azimuth_deg, indexing="ij"))
-    weight = _row_weights(rows) * (2.0 * np.pi / columns)
-    return radiance / (radiance * weight[:, None]).sum()
-
-
-@cache
-def _row_weights(rows: int) -> np.ndarray:
-    """Integral of cos z sin z dz over the upper hemisphere with each row's interpolation weight."""
-    step = np.pi / (rows - 1)
-    fine = (np.arange(200_000) + 0.5) * (0.5 * np.pi / 200_000)
-    place = fine / step
-    row = place.astype(np.int64)
-    value = np.cos(fine) * np.sin(fine) * (0.5 * np.pi / len(fine))
-    part = place - row
-    weight = np.bincount(row, value * (1.0 - part), rows)
-    return weight + np.bincount(row + 1, value * part, rows)
 
 
 def build(
@@ -201,16 +50,15 @@ def build(
     Raises
     ------
     InputError
-        More than three bands, unknown kinds of mesh, or leaf angles that are not spherical.
+        More than three bands, a surface without optics, or leaf angles that are not spherical.
     """
     if not 1 <= len(optics) <= 3:
         raise InputError(
             "bands", f"{len(optics)} bands", "1 to 3", "Gather them with scene.group_bands."
         )
-    scene.check_kinds()
+    scene.check()
     mi = engine.load(variant)
     register()
-    colour = _colours(mi, optics)
     grid = turbid_grid(scene.voxels)
     if grid is not None and grid.leaf_angle_distribution != "spherical":
         raise InputError(
@@ -221,20 +69,23 @@ def build(
         )
     rows = 2 * round(90.0 / sky_step_deg) + 1
     shape = (rows, 2 * (rows - 1))
+    bsdfs = _bsdfs(mi, scene, optics)
+    ground = mi.load_dict({"type": "diffuse", "reflectance": grey(optics, scene.ground_optics)})
     content = {
         "type": "scene",
         "sun": dark_sun(mi),
         "sky": sky_emitter(mi, shape),
         "ground": {
             "type": "disk",
-            "to_world": _affine(mi, _below(scene, grid), ground_radius_m),
-            "bsdf": {"type": "diffuse", "reflectance": colour["ground_reflectance"]},
+            "to_world": _affine(mi, _below(scene), ground_radius_m),
+            "bsdf": ground,
         },
-        **mesh_shapes(mi, scene.meshes, colour),
+        **_plants(mi, scene, bsdfs),
     }
     box = None
     if grid is not None:
-        content["voxels"], box = _medium_box(mi, grid, colour, scene.ground_z_m)
+        leaf = leaf_shares(optics, scene.voxel_optics)
+        content["voxels"], box = _medium_box(mi, grid, *leaf, scene.ground_z_m)
     loaded = mi.load_dict(content)
     inside = [shape.interior_medium() for shape in loaded.shapes() if shape.id() == "voxels"]
     return RenderScene(
@@ -247,27 +98,42 @@ def build(
         sky_shape=shape,
         medium=inside[0] if inside else None,
         medium_box_m=box,
+        bsdfs=[*bsdfs.items(), (scene.ground_optics, ground)],
     )
 
 
-def mesh_shapes(mi: ModuleType, meshes: dict[str, Mesh], colour: dict[str, Any]) -> dict[str, Any]:
-    """Mitsuba meshes by kind; `colour` holds the reflectances as Mitsuba dictionaries."""
-    lambertian = {"wood": "bark_reflectance", "ground": "ground_reflectance"}
-    bsdf = {
-        "leaf": {
-            "type": "bilambertian",
-            "reflectance": _plain(mi, colour["leaf_reflectance"]),
-            "transmittance": _plain(mi, colour["leaf_transmittance"]),
-        },
-    } | {
-        kind: {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": colour[name]}}
-        for kind, name in lambertian.items()
-    }
-    return {
-        f"{kind}_mesh": triangles(mi, kind, mesh, mi.load_dict(bsdf[kind]))
-        for kind, mesh in meshes.items()
-        if len(mesh.faces)
-    }
+def _bsdfs(mi: ModuleType, scene: Scene, optics: Optics) -> dict[str, Any]:
+    """What surfaces are made of, by name of optics; each serves all surfaces that share it."""
+    found = {}
+    for surface in scene.filled:
+        name = surface.optics
+        if surface.is_leaf:
+            reflectance, transmittance = (mi.ScalarColor3f(x) for x in leaf_shares(optics, name))
+            bsdf = {"reflectance": reflectance, "transmittance": transmittance}
+            bsdf["type"] = "bilambertian"
+        else:
+            inner = {"type": "diffuse", "reflectance": grey(optics, name)}
+            bsdf = {"type": "twosided", "bsdf": inner}
+        if name not in found:
+            found[name] = mi.load_dict(bsdf)
+    return found
+
+
+def _plants(mi: ModuleType, scene: Scene, bsdfs: dict[str, Any]) -> dict[str, Any]:
+    """Meshes where they are, and groups of meshes in many places."""
+    content: dict[str, Any] = {}
+    for number, (places_m, surfaces) in enumerate(scene.plants):
+        meshes = {
+            f"{surface.optics}_{number}_{k}": triangles(
+                mi, f"{surface.optics}_{number}_{k}", surface.mesh, bsdfs[surface.optics]
+            )
+            for k, surface in enumerate(surfaces)
+        }
+        if places_m is None:
+            content |= meshes
+        else:
+            content |= instances(mi, f"plant_{number}", meshes, places_m)
+    return content
 
 
 def triangles(mi: ModuleType, name: str, mesh: Mesh, bsdf: Any) -> Any:
@@ -283,37 +149,11 @@ def triangles(mi: ModuleType, name: str, mesh: Mesh, bsdf: Any) -> Any:
     return shape
 
 
-def _colours(mi: ModuleType, optics: Optics) -> dict[str, dict]:
-    """Optical properties as rgb dictionaries; values that are no share of light are errors."""
-    n = len(optics)
-    names = [name for name in Optics.__dataclass_fields__ if name != "wavelength_nm"]
-    values = {name: channels(getattr(optics, name), n) for name in names}
-    values["leaf_albedo"] = values["leaf_reflectance"] + values["leaf_transmittance"]
-    for name, share in values.items():
-        if share.min() < 0.0 or share.max() > 1.0 + 1e-6:
-            raise InputError(
-                name, f"{share.min():.3g} to {share.max():.3g}", "0 to 1", "Check the spectra."
-            )
-    return {
-        name: {"type": "rgb", "value": np.minimum(share, 1.0).tolist()}
-        for name, share in values.items()
-    }
-
-
-def _plain(mi: ModuleType, colour: dict) -> Any:
-    return mi.ScalarColor3f(colour["value"])
-
-
-def _below(scene: Scene, grid: TurbidGrid | None) -> np.ndarray:
+def _below(scene: Scene) -> np.ndarray:
     """The point of the ground below the middle of the plants."""
-    corners = [mesh.vertices_m for mesh in scene.meshes.values() if len(mesh.faces)]
-    if grid is not None:
-        shape = np.array(grid.plant_area_density_m2_m3.shape)
-        corners.append(grid.low_m + np.array([np.zeros(3), shape * grid.voxel_size_m]))
-    if not corners:
+    if not scene.filled and turbid_grid(scene.voxels) is None:
         return np.array([0.0, 0.0, scene.ground_z_m])
-    points = np.concatenate(corners)
-    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    middle = scene.bounds_m.mean(axis=0)
     return np.array([middle[0], middle[1], scene.ground_z_m])
 
 
@@ -321,13 +161,6 @@ def _affine(mi: ModuleType, shift_m: np.ndarray, scale: float | np.ndarray) -> A
     scale = np.broadcast_to(np.asarray(scale, dtype=np.float64), 3).tolist()
     transform = mi.ScalarTransform4f()
     return transform.translate(np.asarray(shift_m).tolist()) @ transform.scale(scale)
-
-
-def facing(mi: ModuleType, way: np.ndarray) -> Any:
-    """Transform that turns Mitsuba's z axis to the unit vector `way`."""
-    aside = [0.0, 1.0, 0.0] if abs(way[2]) > 0.7 else [0.0, 0.0, 1.0]
-    target = np.asarray(way).tolist()
-    return mi.ScalarTransform4f().look_at(origin=[0.0, 0.0, 0.0], target=target, up=aside)
 
 
 def dark_sun(mi: ModuleType) -> dict:
@@ -351,7 +184,11 @@ def sky_emitter(mi: ModuleType, shape: tuple[int, int]) -> dict:
 
 
 def _medium_box(
-    mi: ModuleType, grid: TurbidGrid, colour: dict[str, Any], ground_z_m: float
+    mi: ModuleType,
+    grid: TurbidGrid,
+    reflectance: list[float],
+    transmittance: list[float],
+    ground_z_m: float,
 ) -> tuple[dict, np.ndarray]:
     """A cube of turbid medium with one layer of empty voxels around the filled ones.
 
@@ -366,6 +203,7 @@ def _medium_box(
     if abs(low[2] + inset_low[2] - ground_z_m) < 0.1 * size:
         inset_low[2] = 0.618 * size
     box = np.stack([low + inset_low, high - inset_high])
+    albedo = np.minimum(np.add(reflectance, transmittance), 1.0)
     cube = {
         "type": "cube",
         "id": "voxels",
@@ -373,7 +211,7 @@ def _medium_box(
         "bsdf": {"type": "null"},
         "interior": {
             "type": "heterogeneous",
-            "albedo": colour["leaf_albedo"],
+            "albedo": {"type": "rgb", "value": albedo.tolist()},
             "sigma_t": {
                 "type": "gridvolume",
                 # Mitsuba's grids run z, y, x, channel
@@ -385,8 +223,8 @@ def _medium_box(
             },
             "phase": {
                 "type": "leaf_phase",
-                "reflectance": _plain(mi, colour["leaf_reflectance"]),
-                "transmittance": _plain(mi, colour["leaf_transmittance"]),
+                "reflectance": mi.ScalarColor3f(reflectance),
+                "transmittance": mi.ScalarColor3f(transmittance),
             },
         },
     }

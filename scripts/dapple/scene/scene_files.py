@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from dapple.formats import meshes, voxel_grids
-from dapple.scene.surfaces import Scene
+from dapple.scene.surfaces import Scene, of_kinds
 
 
 def read(leaves: Sequence[str], wood: str, ground_z_m: float = 0.0) -> list[Scene]:
@@ -23,10 +23,10 @@ def read(leaves: Sequence[str], wood: str, ground_z_m: float = 0.0) -> list[Scen
     scenes = []
     for path in map(Path, leaves):
         if path.suffix == ".nc":
-            scenes.append(Scene({"wood": branches}, voxel_grids.read(path), ground_z_m))
+            scenes.append(Scene(of_kinds(wood=branches), voxel_grids.read(path), ground_z_m))
         else:
-            leaf = meshes.read_ply(path)
-            scenes.append(Scene({"leaf": leaf, "wood": branches}, None, ground_z_m))
+            surfaces = of_kinds(leaf=meshes.read_ply(path), wood=branches)
+            scenes.append(Scene(surfaces, None, ground_z_m))
     return scenes
 
 
@@ -41,6 +41,4 @@ def read_plot(leaves: str, wood: str, terrain: str) -> Scene:
     kinds = {"leaf": leaves, "wood": wood, "ground": terrain}
     found = {kind: meshes.read_ply(path) for kind, path in kinds.items()}
     lowest = float(found["ground"].vertices_m[:, 2].min())
-    # Mitsuba takes no mesh without triangles.
-    some = {kind: mesh for kind, mesh in found.items() if mesh.n_elements}
-    return Scene(some, ground_z_m=lowest)
+    return Scene(of_kinds(**found), ground_z_m=lowest)

@@ -1,15 +1,52 @@
-"""What light meets: meshes of leaves, wood and terrain, turbid voxels, the ground, and optics."""
+"""What light meets: surfaces of leaves, wood and terrain, turbid voxels, the ground."""
 
-from dataclasses import dataclass, field
-from itertools import combinations
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
+from dapple.scene.counters import Counters
 
-MESH_KINDS = ("leaf", "wood", "ground")
+LEAF, WOOD, GROUND = "leaf", "wood", "ground"
+"""Names of the usual optics."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A mesh, what it is made of and where it stands.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        Local frame [m].
+    optics : str
+        Name of its spectra in `scene_optics.Optics`.
+    is_leaf : bool
+        A bi-Lambertian leaf, both faces of which reflect and transmit; else opaque and Lambertian.
+    places_m : (k, 3) float64 or None
+        The mesh stands at these places, shifted from where it is, and is stored once; None: where
+        it is [m]. Surfaces of one plant have the same places.
+    """
+
+    mesh: Mesh
+    optics: str = LEAF
+    is_leaf: bool = True
+    places_m: np.ndarray | None = None
+
+
+def of_kinds(
+    leaf: Mesh | None = None, wood: Mesh | None = None, ground: Mesh | None = None
+) -> tuple[Surface, ...]:
+    """Surfaces of the usual optics: one kind of leaves, wood, terrain that is not flat."""
+    kinds = {LEAF: leaf, WOOD: wood, GROUND: ground}
+    return tuple(
+        Surface(mesh, name, is_leaf=name == LEAF)
+        for name, mesh in kinds.items()
+        if mesh is not None
+    )
 
 
 @dataclass(frozen=True)
@@ -18,48 +55,92 @@ class Scene:
 
     Attributes
     ----------
-    meshes : dict of str to Mesh
-        By optical kind: `leaf` (bi-Lambertian), `wood` and `ground` (Lambertian, opaque). The
-        latter is terrain that is not flat.
+    surfaces : sequence of Surface
+        Meshes, each with its optics; several may share theirs.
     voxels : xarray.Dataset or None
         Turbid leaf medium: `plant_area_density_m2_m3` (x, y, z), attribute `voxel_size_m`.
     ground_z_m : float
         Height of the flat Lambertian ground around and below everything [m]; with terrain no higher
         than its lowest point, since it has no hole where the terrain is.
+    voxel_optics, ground_optics : str
+        Names of the optics of the voxels' leaves and of the ground, flat or terrain.
     """
 
-    meshes: dict[str, Mesh] = field(default_factory=dict)
+    surfaces: Sequence[Surface] = ()
     voxels: xr.Dataset | None = None
     ground_z_m: float = 0.0
+    voxel_optics: str = LEAF
+    ground_optics: str = GROUND
+
+    @property
+    def filled(self) -> tuple[Surface, ...]:
+        """Surfaces that have triangles."""
+        return tuple(surface for surface in self.surfaces if len(surface.mesh.faces))
+
+    @property
+    def counters(self) -> Counters:
+        """What light paths count in this scene: leaves before opaque surfaces, the ground last.
+
+        Raises
+        ------
+        InputError
+            One name for leaves and for something opaque.
+        """
+        leaves = [surface.optics for surface in self.surfaces if surface.is_leaf]
+        leaves += [] if self.voxels is None else [self.voxel_optics]
+        others = [surface.optics for surface in self.surfaces if not surface.is_leaf]
+        others = [name for name in others if name != self.ground_optics] + [self.ground_optics]
+        if both := set(leaves) & set(others):
+            raise InputError(
+                "Scene.surfaces",
+                f"the optics `{min(both)}` of leaves and of an opaque surface",
+                "each name for one of both",
+                "Name the optics of one of them differently.",
+            )
+        return Counters(tuple(dict.fromkeys(leaves)), tuple(dict.fromkeys(others)))
 
     @property
     def bounds_m(self) -> np.ndarray:
         """(2, 3) lowest and highest coordinates of meshes and filled voxels [m]."""
-        corners = [mesh.vertices_m for mesh in self.meshes.values() if len(mesh.vertices_m)]
+        corners = [_corners(surface) for surface in self.filled]
         if (grid := turbid_grid(self.voxels)) is not None:
             size = np.array(grid.plant_area_density_m2_m3.shape) * grid.voxel_size_m
             corners.append(np.array([grid.low_m, grid.low_m + size]))
         points = np.concatenate(corners)
         return np.array([points.min(axis=0), points.max(axis=0)])
 
-    def check_kinds(self) -> None:
-        """Make sure that engines know what they are given.
+    @property
+    def plants(self) -> list[tuple[np.ndarray | None, list[Surface]]]:
+        """Surfaces that have triangles, together with those that stand at the same places.
+
+        Of each plant its places (None: where it is) and surfaces; leaves come first, as everywhere.
+        """
+        found: list[tuple[np.ndarray | None, list[Surface]]] = []
+        order = self.counters
+        for surface in sorted(self.filled, key=lambda one: order.reflected(one.optics)):
+            at = surface.places_m
+            for places, together in found:
+                if (places is None) == (at is None) and np.array_equal(places, at):
+                    together.append(surface)
+                    break
+            else:
+                found.append((at, [surface]))
+        return found
+
+    def of(self, optics: str) -> tuple[Surface, ...]:
+        """Surfaces of these optics."""
+        return tuple(surface for surface in self.surfaces if surface.optics == optics)
+
+    def check(self) -> None:
+        """Make sure that the flat ground hides no terrain.
 
         Raises
         ------
         InputError
-            An unknown kind of mesh, or terrain that dips below the flat ground.
+            Terrain dips below the flat ground.
         """
-        if unknown := set(self.meshes) - set(MESH_KINDS):
-            raise InputError(
-                "Scene.meshes",
-                f"the kind {sorted(unknown)[0]}",
-                f"one of {', '.join(MESH_KINDS)}",
-                "Give each mesh an optical kind.",
-            )
-        terrain = self.meshes.get("ground")
-        lowest = np.inf if terrain is None else terrain.vertices_m[:, 2].min(initial=np.inf)
-        if lowest < self.ground_z_m:
+        terrain = [_corners(one) for one in self.filled if one.optics == self.ground_optics]
+        if (lowest := min((low[2] for low, _ in terrain), default=np.inf)) < self.ground_z_m:
             raise InputError(
                 "Scene.ground_z_m",
                 f"{self.ground_z_m:.3f} m",
@@ -68,18 +149,13 @@ class Scene:
             )
 
 
-@dataclass(frozen=True)
-class Optics:
-    """Optical properties per band: arrays of shape (b,), 0 to 1, and b band centres [nm]."""
-
-    wavelength_nm: np.ndarray
-    leaf_reflectance: np.ndarray
-    leaf_transmittance: np.ndarray
-    bark_reflectance: np.ndarray
-    ground_reflectance: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.wavelength_nm)
+def _corners(surface: Surface) -> np.ndarray:
+    """(2, 3) lowest and highest coordinates of a surface at all its places [m]."""
+    corners = surface.mesh.vertices_m.min(axis=0), surface.mesh.vertices_m.max(axis=0)
+    if surface.places_m is None:
+        return np.array(corners)
+    places = surface.places_m.min(axis=0), surface.places_m.max(axis=0)
+    return np.array(corners) + np.array(places)
 
 
 @dataclass(frozen=True)
@@ -145,72 +221,3 @@ def turbid_grid(voxels: xr.Dataset | None) -> TurbidGrid | None:
         low.append(float(density[name].to_numpy()[filled[0]]) - 0.5 * size)
     angles = str(voxels.attrs.get("leaf_angle_distribution", "spherical")).lower()
     return TurbidGrid(values[tuple(box)], np.array(low), size, angles)
-
-
-def group_bands(
-    optics: Optics, direct: np.ndarray, diffuse: np.ndarray, n: int = 3
-) -> tuple[Optics, np.ndarray]:
-    """Gather bands into a few groups of like leaves, weighted by photon flux.
-
-    What differs between bands is mostly how much a leaf scatters, so the bands are ordered by
-    leaf albedo and cut where the flux-weighted variance of albedo within groups is least.
-
-    Parameters
-    ----------
-    optics : Optics
-        Properties of b bands.
-    direct, diffuse : (b,) or (time, b) array
-        Photon flux of the beam and the sky; only their ratios between bands matter.
-    n : int
-        Number of groups, 1 to 3.
-
-    Returns
-    -------
-    Optics
-        Flux-weighted properties of the n groups.
-    group : (b,) int64
-        The group of each band; `group_flux` sums fluxes accordingly.
-    """
-    if not 1 <= n <= 3 or n > len(optics):
-        raise InputError(
-            "n_bands", f"{n} groups of {len(optics)} bands", "1 to 3", "Ask for fewer groups."
-        )
-    n_bands = len(optics)
-    flux = sum(np.reshape(values, (-1, n_bands)).sum(axis=0) for values in (direct, diffuse))
-    if flux.sum() <= 0.0:
-        flux = np.ones(n_bands)
-    albedo = optics.leaf_reflectance + optics.leaf_transmittance
-    order = np.argsort(albedo, kind="stable")
-    group = np.empty(n_bands, dtype=np.int64)
-    group[order] = _least_variance_groups(albedo[order], flux[order], n)
-    total = group_flux(flux, group, n)
-    fields = ("wavelength_nm", "leaf_reflectance", "leaf_transmittance")
-    fields += ("bark_reflectance", "ground_reflectance")
-    means = {
-        name: group_flux(flux * np.asarray(getattr(optics, name)), group, n)
-        / np.where(total > 0.0, total, 1.0)
-        for name in fields
-    }
-    return Optics(**means), group
-
-
-def group_flux(values: np.ndarray, group: np.ndarray, n: int) -> np.ndarray:
-    """Sum fluxes (..., b) of bands to fluxes (..., n) of their groups."""
-    return np.stack([values[..., group == k].sum(axis=-1) for k in range(n)], axis=-1)
-
-
-def _least_variance_groups(value: np.ndarray, weight: np.ndarray, n: int) -> np.ndarray:
-    """Cut ascending values into n runs with the least weighted variance within; by trial."""
-    zeroth, first, second = (
-        np.concatenate([[0.0], np.cumsum(weight * value**power)]) for power in range(3)
-    )
-    index = np.arange(len(value))
-    best, best_cost = None, np.inf
-    for cuts in combinations(range(1, len(value)), n - 1):
-        edges = np.array([0, *cuts, len(value)])
-        mass, moment = np.diff(zeroth[edges]), np.diff(first[edges])
-        explained = np.divide(moment**2, mass, out=np.zeros(n), where=mass > 0.0)
-        cost = second[-1] - explained.sum() + (mass <= 0.0).sum()
-        if cost < best_cost:
-            best, best_cost = edges, cost
-    return np.searchsorted(best[1:], index, side="right")

@@ -8,9 +8,9 @@ import numpy as np
 
 from dapple import engine
 from dapple.errors import InputError
-from dapple.formats.meshes import Mesh
 from dapple.scene import turbid
-from dapple.scene.surfaces import MESH_KINDS, Scene
+from dapple.scene.counters import Counters
+from dapple.scene.surfaces import Scene, Surface
 
 RAY_OFFSET = 1e-6
 """How far a scattered ray starts from its surface, as a share of the scene's largest coordinate."""
@@ -26,14 +26,19 @@ class TracedScene:
     ----------
     variant : str
         Of Mitsuba.
+    counters : Counters
+        What paths count.
     meshes : mitsuba.Scene or None
-        Leaf, wood and terrain as one mesh, which may stand in many places.
-    n_leaf, n_plant : Dr.Jit UInt32
-        The mesh's first so many triangles are leaf, or leaf and wood; the others are terrain.
-    normals : Dr.Jit Float
-        (3 * triangles,) unit normals; places are shifts and do not turn them.
+        The surfaces of each plant as one mesh, which may stand in many places.
+    triangles : Dr.Jit Float
+        (4 * triangles,) unit normal and counter of reflections of each; places are shifts and do
+        not turn them.
+    first : Dr.Jit UInt32 or None
+        Number of the first triangle of the plant of each of Mitsuba's instances; None: one plant.
     grid : TurbidVoxels or None
         Turbid voxels.
+    of_voxels, of_ground, n_leaf : Dr.Jit UInt32
+        Counters of reflections by voxels and ground; counters below `n_leaf` are those of leaves.
     ground_z, top_z, ray_offset : Dr.Jit Float
         Height of the ground, an endless plane, and of the highest plant; how far a scattered ray
         starts from its surface [m].
@@ -41,14 +46,24 @@ class TracedScene:
         The ground plan that is repeated sideways without end.
     """
 
-    def __init__(self, variant: str, meshes, grid, box_m, ground_z_m: float, cell_m):
-        self.variant, self.grid = variant, grid
+    def __init__(self, variant: str, scene: Scene, meshes, grid, box_m, cell_m):
+        self.variant, self.grid, self.counters = variant, grid, scene.counters
         mi = self.mi
-        self.meshes, self.n_leaf, self.n_plant, self.normals = meshes or (None, None, None, None)
-        extent = max(LEAST_EXTENT_M, float(np.abs(box_m).max()))
+        self.meshes, self.triangles, self.first = meshes or (None, None, None)
         # Opaque numbers stay out of the kernel's code: one kernel serves all scenes.
+        leaves = self.counters.leaves
+        self.of_voxels, self.of_ground, self.n_leaf = (
+            dr.opaque(mi.UInt32, n)
+            for n in (
+                self.counters.reflected(scene.voxel_optics) if grid is not None else 0,
+                self.counters.reflected(scene.ground_optics),
+                2 * len(leaves),
+            )
+        )
+        extent = max(LEAST_EXTENT_M, float(np.abs(box_m).max()))
         self.ground_z, self.top_z, self.ray_offset = (
-            dr.opaque(mi.Float, value) for value in (ground_z_m, box_m[1, 2], RAY_OFFSET * extent)
+            dr.opaque(mi.Float, value)
+            for value in (scene.ground_z_m, box_m[1, 2], RAY_OFFSET * extent)
         )
         self.cell = None
         if cell_m is not None:
@@ -63,6 +78,11 @@ class TracedScene:
             engine.load(self.variant)
         return mitsuba
 
+    @property
+    def word(self) -> type:
+        """Dr.Jit type of packed counts."""
+        return self.mi.UInt32 if self.counters.word.itemsize == 4 else self.mi.UInt64
+
     @dr.syntax
     def segment(self, origin, direction, rng, active):
         """Follow rays to whatever they meet first.
@@ -74,8 +94,11 @@ class TracedScene:
             and the point then lies on the side opposite.
         normal : Normal3f
             Of the leaf or surface, turned to where the ray comes from.
-        leaf, voxel, bark, ground, crossed : Bool
-            What it is (`voxel` is part of `leaf`); none of them where the ray leaves the scene.
+        counter : UInt32
+            Of the surface's reflections; of a leaf's transmissions the next one.
+        met, leaf, voxel, crossed : Bool
+            Whether it is something, a leaf, a leaf in a voxel; or the side of the cell. None of
+            these where the ray leaves the scene.
         """
         mi = self.mi
         ray = mi.Ray3f(origin, direction)
@@ -97,42 +120,48 @@ class TracedScene:
             free = self.grid.march(origin, direction, distance, limit, active)[0]
             voxel = active & (free < distance)
             distance = dr.minimum(free, distance)
-        met = active & (distance < dr.inf)
-        mesh = met & ~voxel & (to_mesh <= distance)
-        ground = met & ~voxel & ~mesh & (to_ground <= distance)
-        crossed = met & ~voxel & ~mesh & ~ground
+        found_any = active & (distance < dr.inf)
+        mesh = found_any & ~voxel & (to_mesh <= distance)
+        ground = found_any & ~voxel & ~mesh & (to_ground <= distance)
+        crossed = found_any & ~voxel & ~mesh & ~ground
 
-        normal = mi.Normal3f(0, 0, 1)
-        leaf, bark = mi.Bool(voxel), mi.Bool(False)
+        normal, counter = mi.Normal3f(0, 0, 1), mi.UInt32(self.of_ground)
         if dr.hint(self.meshes is not None, mode="scalar"):
-            leaf |= mesh & (found.prim_index < self.n_leaf)
-            ground |= mesh & (found.prim_index >= self.n_plant)
-            bark = mesh & ~leaf & ~ground
-            normal[mesh] = dr.gather(mi.Normal3f, self.normals, found.prim_index, mesh)
+            triangle = mi.UInt32(found.prim_index)
+            if dr.hint(self.first is not None, mode="scalar"):
+                instance = dr.reinterpret_array(mi.UInt32, found.instance)
+                triangle += dr.gather(mi.UInt32, self.first, instance, mesh)
+            facts = dr.gather(mi.Vector4f, self.triangles, triangle, mesh)
+            normal[mesh] = mi.Normal3f(facts.x, facts.y, facts.z)
+            counter[mesh] = mi.UInt32(facts.w)
         if dr.hint(self.grid is not None, mode="scalar"):
             drawn = self.grid.leaf_normal(direction, rng, voxel)
             normal[voxel] = drawn
+            counter[voxel] = self.of_voxels
         normal = dr.select(dr.dot(normal, direction) > 0, -normal, normal)
         point = self._wrapped(origin + direction * distance, direction, crossed)
-        return point, normal, leaf, voxel, bark, ground, crossed
+        met = voxel | mesh | ground
+        leaf = met & (counter < self.n_leaf)
+        return point, normal, counter, met, leaf, voxel, crossed
 
     @dr.syntax
     def meet(self, origin, direction, rng, active):
         """As `segment`, but across the sides of the cell: returns all but `crossed`."""
         mi = self.mi
         point, normal = mi.Point3f(origin), mi.Normal3f(0, 0, 1)
-        leaf, voxel, bark, ground = mi.Bool(False), mi.Bool(False), mi.Bool(False), mi.Bool(False)
+        counter = mi.UInt32(0)
+        met, leaf, voxel = mi.Bool(False), mi.Bool(False), mi.Bool(False)
         going = mi.Bool(active)
         while going:
-            end, facing, *kinds, crossed = self.segment(point, direction, rng, going)
+            end, facing, number, *kinds, crossed = self.segment(point, direction, rng, going)
             normal[going] = facing
-            leaf |= going & kinds[0]
-            voxel |= going & kinds[1]
-            bark |= going & kinds[2]
-            ground |= going & kinds[3]
+            counter[going] = number
+            met |= going & kinds[0]
+            leaf |= going & kinds[1]
+            voxel |= going & kinds[2]
             point[going] = end
             going &= crossed
-        return point, normal, leaf, voxel, bark, ground
+        return point, normal, counter, met, leaf, voxel
 
     @dr.syntax
     def transmittance(self, origin, direction, active, coherent=True):
@@ -198,11 +227,7 @@ class TracedScene:
 
 
 def load(
-    scene: Scene,
-    variant: str = "llvm_ad_rgb",
-    *,
-    places_m: np.ndarray | None = None,
-    cell_m: np.ndarray | None = None,
+    scene: Scene, variant: str = "llvm_ad_rgb", *, cell_m: np.ndarray | None = None
 ) -> TracedScene:
     """Hand the meshes to Mitsuba and the voxels to Dr.Jit.
 
@@ -212,8 +237,6 @@ def load(
         What stands on the ground.
     variant : str
         Mitsuba variant, `llvm_ad_*` or `cuda_ad_*`.
-    places_m : (k, 3) float64 or None
-        The meshes stand at these places, shifted from where they are, and are stored once [m].
     cell_m : (2, 2) float64 or None
         Low and high corner (x, y) of a ground plan that repeats sideways without end [m]. What
         reaches beyond one side comes in at the other.
@@ -221,39 +244,65 @@ def load(
     Raises
     ------
     InputError
-        An unknown kind of mesh, terrain below the flat ground, wrong voxels, or voxels wider than
-        the cell.
+        Terrain below the flat ground, wrong voxels, voxels wider than the cell, or one name of
+        optics for leaves and for something opaque.
     """
-    scene.check_kinds()
+    scene.check()
     mi = engine.load(variant)
     grid = turbid.load(mi, scene.voxels)
     cell = None if cell_m is None else np.asarray(cell_m, np.float64)
     _check_cell(grid, cell)
-    filled = [scene.meshes[kind] for kind in MESH_KINDS if kind in scene.meshes]
-    filled = [mesh for mesh in filled if len(mesh.faces)]
     boxes = [] if grid is None else [np.array([grid.low_m, grid.high_m])]
     meshes = None
-    if filled:
-        vertices = [mesh.vertices_m for mesh in filled]
-        box = np.array(
-            [np.min([v.min(0) for v in vertices], 0), np.max([v.max(0) for v in vertices], 0)]
-        )
-        mesh, normals = _merged(mi, filled)
-        content = {"plant": mesh}
-        if places_m is not None or cell is not None:
-            places = _with_copies(np.zeros((1, 3)) if places_m is None else places_m, box, cell)
-            content = _instances(mi, mesh, places)
-            box = box + np.array([places.min(axis=0), places.max(axis=0)])
+    if together := scene.plants:
+        meshes, box = _load_plants(mi, together, scene.counters, cell)
         boxes.append(box)
-        loaded = mi.load_dict({"type": "scene", **content}, optimize=False)
-        counts = [
-            len(scene.meshes[kind].faces) if kind in scene.meshes else 0 for kind in MESH_KINDS
-        ]
-        ends = (dr.opaque(mi.UInt32, n) for n in (counts[0], counts[0] + counts[1]))
-        meshes = loaded, *ends, normals
     boxes.append(np.full((2, 3), scene.ground_z_m))
     box = np.array([np.min(boxes, axis=(0, 1)), np.max(boxes, axis=(0, 1))])
-    return TracedScene(variant, meshes, grid, box, scene.ground_z_m, cell)
+    return TracedScene(variant, scene, meshes, grid, box, cell)
+
+
+def _load_plants(
+    mi: ModuleType,
+    together: list[tuple[np.ndarray | None, list[Surface]]],
+    counters: Counters,
+    cell_m: np.ndarray | None,
+):
+    """Mitsuba's scene of plants, facts of all triangles, each instance's first one; and the box."""
+    content, facts, boxes = {}, [], []
+    n_triangles, firsts = 0, {}
+    for number, (places_m, surfaces) in enumerate(together):
+        name = f"plant_{number}"
+        mesh, own = _merged(mi, surfaces, counters, name)
+        vertices = np.concatenate([one.mesh.vertices_m for one in surfaces])
+        box = np.array([vertices.min(axis=0), vertices.max(axis=0)])
+        if places_m is None and cell_m is None:
+            content[name] = mesh
+        else:
+            places_m = _with_copies(np.zeros((1, 3)) if places_m is None else places_m, box, cell_m)
+            content |= instances(mi, name, {"mesh": mesh}, places_m)
+            box = box + np.array([places_m.min(axis=0), places_m.max(axis=0)])
+        boxes.append(box)
+        facts.append(own)
+        firsts[name] = n_triangles
+        n_triangles += dr.width(own) // 4
+    scene = mi.load_dict({"type": "scene", **content}, optimize=False)
+    first = _first_triangles(mi, scene, firsts) if len(together) > 1 else None
+    box = np.array([np.min(boxes, axis=(0, 1)), np.max(boxes, axis=(0, 1))])
+    return (scene, dr.concat(facts), first), box
+
+
+def _first_triangles(mi: ModuleType, scene, firsts: dict[str, int]):
+    """By Mitsuba's number of an instance the first triangle of its plant; 0 is no instance."""
+    numbers = {
+        dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0]: shape.id().split(":")[0]
+        for shape in scene.shapes()
+        if ":" in shape.id()
+    }
+    table = np.zeros(max(numbers, default=0) + 1, np.uint32)
+    for number, name in numbers.items():
+        table[number] = firsts[name]
+    return mi.UInt32(table)
 
 
 def _check_cell(grid, cell: np.ndarray | None) -> None:
@@ -288,19 +337,21 @@ def _with_copies(places_m: np.ndarray, box_m: np.ndarray, cell_m: np.ndarray | N
     return every[((high > cell_m[0]) & (low < cell_m[1])).all(axis=1)]
 
 
-def _instances(mi: ModuleType, mesh, places_m: np.ndarray) -> dict:
-    content = {"plant": {"type": "shapegroup", "mesh": mesh}}
+def instances(mi: ModuleType, name: str, meshes: dict, places_m: np.ndarray) -> dict:
+    """Mitsuba's dictionary of meshes that are stored once and stand at many places (k, 3) [m]."""
+    content = {name: {"type": "shapegroup", **meshes}}
     for index, place in enumerate(places_m):
-        content[f"plant_{index}"] = {
+        content[f"{name}:{index}"] = {
             "type": "instance",
-            "group": {"type": "ref", "id": "plant"},
+            "group": {"type": "ref", "id": name},
             "to_world": mi.ScalarTransform4f().translate(place.tolist()),
         }
     return content
 
 
-def _merged(mi: ModuleType, meshes: list[Mesh]):
-    """Meshes as one of Mitsuba's, in their order, and its unit normals (3 * triangles,)."""
+def _merged(mi: ModuleType, surfaces: list[Surface], counters: Counters, name: str):
+    """Meshes as one of Mitsuba's, and unit normal and counter of its triangles (4 * triangles,)."""
+    meshes = [surface.mesh for surface in surfaces]
     first = np.cumsum([0] + [len(mesh.vertices_m) for mesh in meshes])
     vertices = mi.Float(np.concatenate([m.vertices_m.astype(np.float32).ravel() for m in meshes]))
     faces = [
@@ -308,12 +359,17 @@ def _merged(mi: ModuleType, meshes: list[Mesh]):
         for mesh, shift in zip(meshes, first[:-1], strict=True)
     ]
     faces = mi.UInt32(np.concatenate(faces))
-    merged = mi.Mesh("plant", int(first[-1]), dr.width(faces) // 3)
+    merged = mi.Mesh(name, int(first[-1]), dr.width(faces) // 3)
     parameters = mi.traverse(merged)
     parameters["vertex_positions"], parameters["faces"] = vertices, faces
     parameters.update()
     corner = dr.gather(mi.Vector3u, faces, dr.arange(mi.UInt32, dr.width(faces) // 3))
     a, b, c = (dr.gather(mi.Point3f, vertices, index) for index in corner)
-    normals = dr.ravel(dr.normalize(dr.cross(b - a, c - a)))
-    dr.eval(normals)
-    return merged, normals
+    normal = dr.normalize(dr.cross(b - a, c - a))
+    counter = np.repeat(
+        np.array([counters.reflected(surface.optics) for surface in surfaces], np.float32),
+        [len(mesh.faces) for mesh in meshes],
+    )
+    facts = dr.ravel(mi.Vector4f(normal.x, normal.y, normal.z, mi.Float(counter)))
+    dr.eval(facts)
+    return merged, facts

@@ -11,7 +11,7 @@ import xarray as xr
 
 from dapple.errors import EmptyCloudError
 from dapple.formats.meshes import Mesh
-from dapple.scene.surfaces import Scene
+from dapple.scene.surfaces import Scene, of_kinds
 from dapple.stability.stressors import Conditions
 from dapple.streams import stream_seed
 from dapple.structure import occlusion, subvoxel_clumping
@@ -44,7 +44,7 @@ def size_of(name: str) -> float:
 
 def _truth(chain: Chain, conditions: Conditions) -> Structure:
     plant = chain.tree(conditions)
-    scene = Scene(plant, None, chain.setup.ground_z_m)
+    scene = Scene(of_kinds(**plant), None, chain.setup.ground_z_m)
     return Structure((scene,), plant["leaf"].area_m2)
 
 
@@ -115,10 +115,10 @@ METHODS: dict[str, Callable[[Chain, Conditions], Structure]] = {
 
 
 def _scene(chain: Chain, meshes: dict[str, Mesh], voxels: xr.Dataset | None = None) -> Scene:
-    filled = {kind: mesh for kind, mesh in meshes.items() if len(mesh.faces)}
-    if not filled and (voxels is None or not (voxels["plant_area_density_m2_m3"] > 0).any()):
+    scene = Scene(of_kinds(**meshes), voxels, chain.setup.ground_z_m)
+    if not scene.filled and (voxels is None or not (voxels["plant_area_density_m2_m3"] > 0).any()):
         raise EmptyCloudError("scene", "no leaf and no wood", "some", "Check the classes.")
-    return Scene(filled, voxels, chain.setup.ground_z_m)
+    return scene
 
 
 def voxel_area_m2(grid: xr.Dataset) -> float:

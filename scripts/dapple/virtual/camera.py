@@ -17,7 +17,8 @@ from dapple.formats.meshes import Mesh
 from dapple.frames import direction_from_angles
 from dapple.scene import patterns
 from dapple.scene.mitsuba_plugins import register
-from dapple.scene.mitsuba_scene import RenderScene, dark_sun, sky_emitter, triangles
+from dapple.scene.mitsuba_scene import dark_sun, sky_emitter, triangles
+from dapple.scene.render_scene import RenderScene
 from dapple.streams import stream_seed
 from dapple.virtual.plot_optics import Materials
 
