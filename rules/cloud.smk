@@ -24,7 +24,7 @@ rule clean:
     resources:
         mem_mb=4000,
     params:
-        **dict(settings.clean),
+        **settings.clean.model_dump(exclude={"distance_points"}),
         ground_z_m=settings.ground_z_m,
         pdal=settings.tools.pdal,
         cloudcompare=settings.tools.cloudcompare,

@@ -14,6 +14,7 @@ SCRIPTS = HOME / "scripts"
 sys.path.append(str(SCRIPTS))
 
 from dapple.clock import label, time_range
+from dapple.cloud.classifiers import CLASSIFIERS
 from dapple.config.settings import validate
 from dapple.errors import InputError
 from dapple.streams import stream_seed

@@ -154,11 +154,7 @@ if settings.source == "cloud":
         params:
             shots=settings.cloud.shots,
             scan_frame=settings.scan_frame.model_dump(),
-            required=(
-                ["Reflectance"]
-                if settings.classify.method in ("reflectance", "mixture")
-                else []
-            ),
+            required=list(CLASSIFIERS[settings.classify.method].needs),
         message:
             said("read {input.cloud}")
         script:

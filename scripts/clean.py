@@ -1,14 +1,14 @@
 """Filter noise and leave one point a voxel."""
 
 from dapple.cloud.clean import clean
-from dapple.formats import json
+from dapple.formats import clouds, json
 from dapple.workflow import options, run
 
 
 def main(snakemake):
-    settings = options(snakemake.params)
-    settings.pop("distance_points")
-    counts = clean(snakemake.input.points, snakemake.output.cloud, **settings)
+    path = snakemake.input.points
+    cloud, counts = clean(clouds.read(path), where=path, **options(snakemake.params))
+    clouds.write(snakemake.output.cloud, cloud)
     json.write(snakemake.output.counts, counts)
 
 

@@ -13,7 +13,7 @@ STABILITY_BASE = (
     "leaves.ply",
     "wood.ply",
     "shots.parquet",
-    "cloud.laz",
+    "cloud.ply",
     "seconds.json",
 )
 # Finer scans and needles fill memory; what they need was measured.

@@ -14,7 +14,7 @@ rule stability_base:
         leaves=results("stability/base/{world}/leaves.ply"),
         wood=results("stability/base/{world}/wood.ply"),
         shots=results("stability/base/{world}/shots.parquet"),
-        cloud=results("stability/base/{world}/cloud.laz"),
+        cloud=results("stability/base/{world}/cloud.ply"),
         seconds=results("stability/base/{world}/seconds.json"),
         undisturbed=results("stability/base/{world}/undisturbed.csv"),
     log:

@@ -6,15 +6,11 @@ import numpy as np
 import pytest
 
 from dapple.cloud import branches, eigenvalues
-from dapple.cloud.classify import (
-    NotSeparableWarning,
-    by_geometry,
-    by_reflectance,
-    codes,
-    find_threshold,
-    majority,
-)
+from dapple.cloud.classifiers import CLASSIFIERS
+from dapple.cloud.classify import classify, codes, majority
 from dapple.cloud.clean import thin
+from dapple.cloud.geometry import by_geometry
+from dapple.cloud.reflectance import NotSeparableWarning, by_reflectance, find_threshold
 from dapple.cloud.scores import scores
 from dapple.errors import EmptyCloudError, InputError
 from dapple.formats.clouds import Cloud
@@ -246,3 +242,39 @@ def test_scores_of_different_clouds_are_an_error():
         scores(np.array([1, 4]), np.array([0, 4]))
     with pytest.raises(EmptyCloudError):
         scores(np.zeros(3), np.full(3, 7))
+
+
+def a_scan_of(xyz_m, is_leaf):
+    """Leaves dark, wood bright, the truth beside them."""
+    rng = np.random.default_rng(7)
+    reflectance_db = np.where(is_leaf, -9.0, -3.0) + rng.normal(0, 0.5, len(xyz_m))
+    truth = np.where(is_leaf, 4, 0).astype(np.uint8)
+    return Cloud(xyz_m, attributes={"Reflectance": reflectance_db, "TrueClass": truth})
+
+
+@pytest.mark.parametrize("method", CLASSIFIERS)
+def test_every_classifier_classifies_and_is_scored(method):
+    xyz_m, is_leaf = tree(spacing_m=0.02)
+    classified, facts = classify(a_scan_of(xyz_m, is_leaf), method, threshold_db=-6.0)
+    kinds = classified.attributes["Classification"]
+    assert set(np.unique(kinds)) <= {0, 4}
+    assert facts["method"] == method
+    assert facts["leaf_share"] == pytest.approx((kinds == 4).mean())
+    assert facts["scores"]["leaf"]["f1"] > 0.6
+    if CLASSIFIERS[method].needs:
+        assert facts["scores"]["accuracy"] > 0.95
+
+
+@pytest.mark.parametrize("method", CLASSIFIERS)
+def test_what_a_classifier_needs_and_lacks_is_named_with_the_file(method):
+    xyz_m, _ = tree(spacing_m=0.03)
+    if CLASSIFIERS[method].needs:
+        with pytest.raises(InputError, match=r"tree.laz: found no attribute 'Reflectance'"):
+            classify(Cloud(xyz_m), method, threshold_db=-6.0, where="tree.laz")
+    else:
+        assert "scores" not in classify(Cloud(xyz_m), method)[1]
+
+
+def test_a_classifier_that_there_is_not_is_an_error_and_not_all_leaf():
+    with pytest.raises(InputError, match="found 'forest'; expected one of reflectance"):
+        classify(Cloud(np.ones((100, 3))), "forest")

@@ -3,22 +3,14 @@
 The order and the thresholds are those of Frey et al. (2025), Silva Fennica 59, 24027.
 """
 
-import tempfile
-from dataclasses import replace
+from collections.abc import Callable
 from pathlib import Path
 
-import laspy
 import numpy as np
 
-from dapple import pdal as pdal_program
-from dapple.cloud import cloudcompare as cc
-from dapple.cloud import voxel_groups
-from dapple.errors import EmptyCloudError, InputError
-from dapple.formats import clouds
-from dapple.formats.cloud_raw import attribute_name
+from dapple.cloud import outliers, voxel_groups
+from dapple.errors import EmptyCloudError
 from dapple.formats.clouds import Cloud
-
-OUTLIER_BACKENDS = ("cloudcompare", "pdal", "none")
 
 CATEGORIES = frozenset(
     [
@@ -46,8 +38,7 @@ CATEGORIES = frozenset(
 
 
 def clean(
-    points_path: str | Path,
-    out_path: str | Path,
+    cloud: Cloud,
     *,
     min_reflectance_db: float | None = -15.0,
     max_deviation: float | None = 15.0,
@@ -59,36 +50,34 @@ def clean(
     ground_z_m: float = 0.0,
     pdal: str = "pdal",
     cloudcompare: str = "CloudCompare",
-) -> dict:
-    """Filter a LAS or LAZ file and write what is left.
+    where: str | Path = "cloud",
+) -> tuple[Cloud, dict]:
+    """Leave out noise, and leave one point a voxel.
 
     Parameters
     ----------
-    points_path, out_path : str or Path
-        LAS or LAZ in world coordinates, header offset = world coordinates of the local origin.
+    cloud : Cloud
+        `Reflectance` [dB] and `Deviation` are filtered by where there are such.
     min_reflectance_db : float or None
         Points at or below this `Reflectance` [dB] go; None skips the step.
     max_deviation : float or None
         Points at or above this pulse shape `Deviation` go; None skips the step.
-    outlier_backend : {"cloudcompare", "pdal", "none"}
-        Who finds statistical outliers; see Notes.
-    outlier_neighbours : int
-        Number of nearest neighbours, the point itself not counted.
-    outlier_multiplier : float
-        A point goes if its mean distance to its neighbours exceeds the mean over all points by
-        more than this many standard deviations.
+    outlier_backend, outlier_neighbours, outlier_multiplier, pdal, cloudcompare
+        See `outliers.inliers`.
     thin_voxel_m : float or None
         Edge of the voxels that keep one point each [m], see `thin`; None skips the step.
     min_height_m : float or None
         Points lower than this above flat ground go [m]; None keeps them all.
     ground_z_m : float
         Height of the ground in the local frame [m].
-    pdal, cloudcompare : str
-        Name or path of the programs.
+    where : str or Path
+        The file to name in errors.
 
     Returns
     -------
-    dict
+    cloud : Cloud
+        What is left.
+    counts : dict
         `input`, `after_height`, `after_reflectance`, `after_deviation`, `after_outliers`,
         `after_thinning`: number of points; `skipped`: list of the steps that were not done and
         why; `outlier_backend` and `versions` of the programs used.
@@ -96,58 +85,58 @@ def clean(
     Raises
     ------
     InputError
-        The file is missing or not LAS/LAZ, a parameter is out of range, a program is absent.
+        An unknown back end, or a program is absent.
     EmptyCloudError
         A filter removed every point; the message names it.
     ProgramError
         PDAL or CloudCompare failed.
-
-    Notes
-    -----
-    Both back ends compute the same statistic (Rusu et al. 2008, Robotics and Autonomous
-    Systems 56). CloudCompare stores coordinates and distances in single precision and divides the
-    variance by n, PDAL uses double precision and n - 1, so that a point within about 1e-6 of the
-    limit may be judged differently.
     """
-    if outlier_backend not in OUTLIER_BACKENDS:
-        raise InputError(
-            "clean.outlier_backend",
-            repr(outlier_backend),
-            f"one of {', '.join(OUTLIER_BACKENDS)}",
-            "Change the configuration.",
-        )
-    names, origin_m = _dimensions_and_origin(points_path)
     skipped: list[str] = []
-    steps = _steps(names, min_reflectance_db, max_deviation, skipped)
-    if min_height_m is not None:
-        z_m = origin_m[2] + ground_z_m + min_height_m
-        steps = {"height": [pdal_program.keep("Z", f"[{z_m:.4f}:]")], **steps}
-    if outlier_backend == "pdal":
-        steps["outliers"] = pdal_program.remove_outliers(outlier_neighbours, outlier_multiplier)
-    counts, cloud = _filter(points_path, steps, origin_m, pdal)
-    versions = {"pdal": pdal_program.version(pdal)}
-
-    if outlier_backend == "cloudcompare":
-        engine = cc.engine(cloudcompare)
-        kept = engine.inliers(cloud.xyz_m, outlier_neighbours, outlier_multiplier)
-        cloud = cloud.select(kept)
-        versions[engine.name] = engine.version
+    counts = {"input": len(cloud)}
+    kept = np.ones(len(cloud), bool)
+    lowest_m = -np.inf if min_height_m is None else ground_z_m + min_height_m
+    for step, chosen in (
+        ("height", cloud.xyz_m[:, 2] >= lowest_m),
+        ("reflectance", _within(cloud, "Reflectance", np.greater, min_reflectance_db, skipped)),
+        ("deviation", _within(cloud, "Deviation", np.less, max_deviation, skipped)),
+    ):
+        kept &= chosen
+        counts[f"after_{step}"] = _not_empty(int(kept.sum()), step, counts, where)
+    cloud = cloud.select(kept)
+    chosen, versions = outliers.inliers(
+        cloud.xyz_m,
+        outlier_backend,
+        neighbours=outlier_neighbours,
+        multiplier=outlier_multiplier,
+        pdal=pdal,
+        cloudcompare=cloudcompare,
+    )
+    cloud = cloud.select(chosen)
+    counts["after_outliers"] = _not_empty(len(cloud), "outliers", counts, where)
     if outlier_backend == "none":
         skipped.append("outliers: outlier_backend is none")
-    counts["after_outliers"] = _not_empty(len(cloud), "outliers", counts, points_path)
-
     if thin_voxel_m is None:
         skipped.append("thinning: thin_voxel_m is not set")
     else:
         cloud = thin(cloud, thin_voxel_m)
     counts["after_thinning"] = len(cloud)
-    clouds.write(out_path, cloud)
-    return {
-        **counts,
-        "skipped": skipped,
-        "outlier_backend": outlier_backend,
-        "versions": versions,
-    }
+    facts = {"skipped": skipped, "outlier_backend": outlier_backend, "versions": versions}
+    return cloud, counts | facts
+
+
+def _within(
+    cloud: Cloud, attribute: str, compare: Callable, limit: float | None, skipped: list[str]
+) -> np.ndarray | bool:
+    """(n,) bool, points on the right side of a limit; True, and why, where nothing is asked."""
+    step = attribute.lower()
+    if limit is None:
+        skipped.append(f"{step}: no limit is set")
+        return True
+    if attribute not in cloud.attributes:
+        skipped.append(f"{step}: the points have no dimension {attribute}")
+        return True
+    # In double precision: a limit between two single-precision numbers stays between them.
+    return compare(cloud.attributes[attribute].astype(np.float64), limit)
 
 
 def thin(cloud: Cloud, voxel_size_m: float) -> Cloud:
@@ -202,70 +191,11 @@ def _most_frequent(values: np.ndarray, groups: voxel_groups.Groups) -> np.ndarra
     return value[run][best][first]
 
 
-def _dimensions_and_origin(path: str | Path) -> tuple[dict[str, str], np.ndarray]:
-    """Our names of the dimensions with those in the file, and the origin of the local frame."""
-    if Path(path).suffix.lower() not in (".las", ".laz"):
-        raise InputError(path, "another format", "LAS or LAZ", "Bring the scan into LAZ first.")
-    first = next(clouds.iterate(path, 1), None)
-    if first is None:
-        raise EmptyCloudError(path, "no points", "a scan", "Check how the file was exported.")
-    with laspy.open(path) as file:
-        names = file.header.point_format.dimension_names
-        return {attribute_name(name): name for name in names}, first.origin_m
-
-
-def _steps(
-    names: dict[str, str],
-    min_reflectance_db: float | None,
-    max_deviation: float | None,
-    skipped: list[str],
-) -> dict[str, list[dict]]:
-    """PDAL stages of the two thresholds; what is left out is noted in `skipped`."""
-    limits = {
-        "reflectance": ("Reflectance", "({}:]", min_reflectance_db),
-        "deviation": ("Deviation", "[:{})", max_deviation),
-    }
-    steps = {}
-    for step, (dimension, interval, limit) in limits.items():
-        if limit is None:
-            skipped.append(f"{step}: no limit is set")
-        elif dimension not in names:
-            skipped.append(f"{step}: the points have no dimension {dimension}")
-        else:
-            steps[step] = [pdal_program.keep(names[dimension], interval.format(limit))]
-    return steps
-
-
-def _filter(
-    path: str | Path, steps: dict[str, list[dict]], origin_m: np.ndarray, pdal: str
-) -> tuple[dict[str, int], Cloud]:
-    """Run the steps in one pipeline and count after each; a step not done keeps the number."""
-    stages: list[dict | str] = [
-        {"type": "readers.las", "filename": str(path)},
-        pdal_program.count(),
-    ]
-    for step in steps.values():
-        stages += [*step, pdal_program.count()]
-    with tempfile.TemporaryDirectory(prefix="clean-") as folder:
-        filtered = Path(folder, "filtered.las")
-        result = pdal_program.run([*stages, pdal_program.write_las(filtered, origin_m)], pdal)
-        counts = {"input": result.counts[0]}
-        seen = dict(zip(steps, result.counts[1:], strict=True))
-        for step in ("height", "reflectance", "deviation", "outliers"):
-            if step in seen or step != "outliers":
-                before = list(counts.values())[-1]
-                counts[f"after_{step}"] = _not_empty(seen.get(step, before), step, counts, path)
-        cloud = clouds.read(filtered)
-    cloud.attributes.pop("ClassFlags", None)  # PDAL's extra copy of the LAS 1.4 flags
-    xyz_m = cloud.xyz_m + (cloud.origin_m - origin_m)
-    return counts, replace(cloud, xyz_m=xyz_m, origin_m=np.array(origin_m))
-
-
-def _not_empty(n_points: int, step: str, counts: dict[str, int], path: str | Path) -> int:
+def _not_empty(n_points: int, step: str, counts: dict[str, int], where: str | Path) -> int:
     if n_points == 0:
         before = list(counts.values())[-1]
         raise EmptyCloudError(
-            path,
+            where,
             f"no point left of {before} after the {step} filter",
             "some points to keep",
             f"Check the limits of the {step} filter against the values in the file.",

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated
 
-from dapple.config.base import FREY, Positive, Section, key
+from dapple.cloud.classifiers import CLASSIFIERS
+from dapple.config.base import FREY, OneOf, Positive, Section, key
 
 
 class Classify(Section):
     """Leaf or wood."""
 
-    method: Literal["reflectance", "mixture", "geometry", "all_leaf"] = key(
-        "reflectance",
-        "fixed threshold, threshold from the data, shape of the neighbourhood, or none",
+    method: Annotated[str, OneOf(CLASSIFIERS)] = key(
+        "reflectance", ", ".join(f"{name}: {one.summary}" for name, one in CLASSIFIERS.items())
     )
     threshold_db: float = key(-5.4, "reflectance above which a point is wood", FREY)
     majority_voxel_m: Positive = key(0.05, "voxels in which the majority decides", FREY)

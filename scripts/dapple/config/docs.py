@@ -8,7 +8,7 @@ import yaml
 from annotated_types import Ge, Gt, Le, MinLen
 from pydantic.fields import FieldInfo
 
-from dapple.config.base import Section
+from dapple.config.base import OneOf, Section
 from dapple.config.settings import Settings
 from dapple.formats.atomic import atomic
 
@@ -103,7 +103,8 @@ def _range(field: FieldInfo) -> str:
     ]
     if any(isinstance(limit, MinLen) for limit in field.metadata):
         limits.append("not empty")
-    choices = getattr(field.annotation, "__args__", ())
+    named = [one.names for one in field.metadata if isinstance(one, OneOf)]
+    choices = named[0] if named else getattr(field.annotation, "__args__", ())
     if not limits and choices and all(isinstance(choice, str | int) for choice in choices):
         return ", ".join(f"`{choice}`" for choice in choices)
     return ", ".join(limits)

@@ -1,20 +1,16 @@
 """One run under disturbed conditions: from the world to light, every method, in one process."""
 
-import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from dapple.cloud import classify
+from dapple.cloud.classify import classify
 from dapple.cloud.clean import clean
 from dapple.cloud.scores import scores
-from dapple.errors import EmptyCloudError
-from dapple.formats import clouds
 from dapple.formats import shots as shot_files
 from dapple.formats.clouds import LEAF, WOOD, Cloud
 from dapple.formats.meshes import Mesh
@@ -34,26 +30,6 @@ from dapple.verdict.inputs import no_mesh
 
 SHIFT_M = 0.1
 """How far sensors are moved to see how sensitive their light is."""
-
-
-@dataclass(frozen=True)
-class Classes:
-    """Points that are leaf or wood, and how well they are told apart.
-
-    Attributes
-    ----------
-    cloud : Cloud
-        Cleaned, with `Classification`.
-    f1 : dict of str to float
-        `f1_leaf` and `f1_wood` of the classes in use.
-    """
-
-    cloud: Cloud
-    f1: dict[str, float]
-
-    def points_m(self, kind: int) -> np.ndarray:
-        """Points of one class (n, 3) [m]."""
-        return self.cloud.xyz_m[self.cloud.attributes["Classification"] == kind]
 
 
 class Chain:
@@ -110,23 +86,20 @@ class Chain:
 
         def make() -> Cloud:
             cloud = shot_files.to_cloud(self.shots(conditions))
-            lowest_m = self.setup.ground_z_m + self.setup.clean["min_height_m"]
-            cloud = cloud.select(cloud.xyz_m[:, 2] >= lowest_m)
             cloud.attributes["Reflectance"] = cloud.attributes["Reflectance"] + np.float32(
                 conditions.drift_db
             )
-            return cleaned(cloud, **self.setup.clean, ground_z_m=self.setup.ground_z_m)
+            return clean(cloud, **self.setup.clean, ground_z_m=self.setup.ground_z_m)[0]
 
         return self._step("clean", conditions, make)
 
-    def classes(self, conditions: Conditions) -> Classes:
-        """Points told apart."""
+    def classes(self, conditions: Conditions) -> Cloud:
+        """Points told apart, with `Classification`."""
 
-        def make() -> Classes:
-            cloud = self.clean(conditions)
-            kinds = self._classified(conditions.classes, cloud)
-            attributes = cloud.attributes | {"Classification": kinds}
-            return Classes(Cloud(cloud.xyz_m, cloud.origin_m, attributes), f1_of(kinds, cloud))
+        def make() -> Cloud:
+            settings = dict(self.setup.classify)
+            usual = settings.pop("method")
+            return self._classified(conditions, conditions.classifier or usual)
 
         return self._step("classes", conditions, make)
 
@@ -134,46 +107,37 @@ class Chain:
         """F1 of both classifiers, whichever is in use."""
 
         def make() -> dict[str, float]:
-            cloud = self.clean(conditions)
             found = {}
             for name, method in (("threshold", "reflectance"), ("geometry", "geometry")):
-                f1 = f1_of(self._classified(method, cloud), cloud)
+                f1 = f1_of(self._classified(replace(conditions, has_stem=True), method))
                 found |= {f"{label}_{name}": value for label, value in f1.items()}
             return found
 
         return self._step("classifiers", conditions, make)
 
-    def _classified(self, method: str, cloud: Cloud) -> np.ndarray:
-        settings = self.setup.classify
-        match method:
-            case "reflectance":
-                leaf = classify.by_reflectance(
-                    cloud.attributes["Reflectance"], settings["threshold_db"]
-                )
-            case "mixture":
-                found = classify.find_threshold(cloud.attributes["Reflectance"], seed=self.seed)
-                leaf = classify.by_reflectance(cloud.attributes["Reflectance"], found.threshold_db)
-            case "geometry":
-                leaf = classify.by_geometry(cloud.xyz_m)
-            case "geometry_no_stem":
-                crown = cloud.xyz_m[:, 2] > self.setup.ground_z_m + self.setup.plant["crown_base_m"]
-                leaf = np.zeros(len(cloud), bool)
-                leaf[crown] = classify.by_geometry(cloud.xyz_m[crown])
-            case _:
-                leaf = np.ones(len(cloud), bool)
-        return classify.codes(classify.majority(cloud.xyz_m, leaf, settings["majority_voxel_m"]))
+    def _classified(self, conditions: Conditions, method: str) -> Cloud:
+        cloud, settings = self.clean(conditions), dict(self.setup.classify) | {"method": method}
+        if conditions.has_stem:
+            return classify(cloud, **settings, seed=self.seed)[0]
+        # A classifier that never saw the stem; all below the crown is wood.
+        crown = cloud.xyz_m[:, 2] > self.setup.ground_z_m + self.setup.plant["crown_base_m"]
+        kinds = np.full(len(cloud), WOOD, np.uint8)
+        above = classify(cloud.select(crown), **settings, seed=self.seed)[0]
+        kinds[crown] = above.attributes["Classification"]
+        return Cloud(cloud.xyz_m, cloud.origin_m, cloud.attributes | {"Classification": kinds})
 
     def polygons(self, conditions: Conditions) -> dict[str, Mesh]:
         """Leaf and wood polygons; no wood where no point is wood."""
 
         def make() -> dict[str, Mesh]:
-            classes = self.classes(conditions)
+            cloud = self.classes(conditions)
+            kinds = cloud.attributes["Classification"]
             settings = dict(self.setup.polygons)
             settings["voxel_size_m"] *= conditions.voxel_factor
             seed = stream_seed(self.seed, "polygons")
-            wood_m = classes.points_m(WOOD)
+            wood_m = cloud.xyz_m[kinds == WOOD]
             return {
-                "leaf": reconstruct(classes.points_m(LEAF), seed=seed, what="leaf", **settings),
+                "leaf": reconstruct(cloud.xyz_m[kinds == LEAF], seed=seed, what="leaf", **settings),
                 "wood": reconstruct(wood_m, seed=seed, what="wood", **settings)
                 if len(wood_m)
                 else no_mesh(),
@@ -185,7 +149,7 @@ class Chain:
         """Plant area density in voxels of a size (before it is multiplied)."""
 
         def make() -> xr.Dataset:
-            cloud = self.classes(conditions).cloud
+            cloud = self.classes(conditions)
             bounds_m = np.array([cloud.xyz_m.min(axis=0), cloud.xyz_m.max(axis=0)])
             settings = dict(self.setup.voxels)
             if conditions.max_pad_m2_m3 is not None:
@@ -201,7 +165,7 @@ class Chain:
 
     def kinds(self, conditions: Conditions) -> Callable[[Shots], np.ndarray]:
         """What each return is, by the classified points around it."""
-        cloud = self.classes(conditions).cloud
+        cloud = self.classes(conditions)
         return kinds_by_place(
             cloud.xyz_m,
             cloud.attributes["Classification"],
@@ -328,20 +292,9 @@ STAGE_OF = {
 """By which stage's conditions a step is known again; `structure` for what is not named."""
 
 
-def cleaned(cloud: Cloud, **settings: Any) -> Cloud:
-    """The noise filter of `cloud.clean`, which works on files, on a cloud in memory."""
-    if not len(cloud):
-        raise EmptyCloudError("scan", "no point above the ground", "some", "Check the scan.")
-    with tempfile.TemporaryDirectory(prefix="stability-") as folder:
-        points, out = Path(folder, "points.laz"), Path(folder, "cloud.laz")
-        clouds.write(points, cloud)
-        clean(points, out, **settings)
-        return clouds.read(out)
-
-
-def f1_of(kinds: np.ndarray, cloud: Cloud) -> dict[str, float]:
+def f1_of(cloud: Cloud) -> dict[str, float]:
     """F1 of leaf and of wood against the truth that a virtual cloud carries."""
-    found = scores(kinds, cloud.attributes["TrueClass"])
+    found = scores(cloud.attributes["Classification"], cloud.attributes["TrueClass"])
     return {"f1_leaf": found["leaf"]["f1"], "f1_wood": found["wood"]["f1"]}
 
 

@@ -13,7 +13,7 @@ from dapple.formats.clouds import LEAF
 from dapple.formats.netcdf import times
 from dapple.light import series
 from dapple.light.series import Light
-from dapple.stability.chain import SHIFT_M, Chain, true_conditions
+from dapple.stability.chain import SHIFT_M, Chain, f1_of, true_conditions
 from dapple.stability.reconstructions import METHODS, size_of
 from dapple.stability.stressors import Conditions, Level, Stressor
 from dapple.stats import measured
@@ -105,7 +105,7 @@ def rows(
         "label": level.label,
         "harmless": level.value == stressor.harmless,
     }
-    classes = _tried(lambda: chain.classifiers(conditions) | chain.classes(conditions).f1)
+    classes = _tried(lambda: chain.classifiers(conditions) | f1_of(chain.classes(conditions)))
     head |= classes if isinstance(classes, dict) else {}
     found, light = [], {}
     for name in methods(wanted):
@@ -149,7 +149,8 @@ def evidence(
     truth : Light
         What sensors record, with the noise of an ordinary sensor and by the right clock.
     """
-    classes = chain.classes(conditions)
+    cloud = chain.classes(conditions)
+    leaves_m = cloud.xyz_m[cloud.attributes["Classification"] == LEAF]
     meshes = _tried(lambda: chain.polygons(conditions))
     has_polygons = isinstance(meshes, dict)
     meshes = meshes if has_polygons else {"leaf": no_mesh(), "wood": no_mesh()}
@@ -166,10 +167,10 @@ def evidence(
     edge_m = chain.setup.polygons["voxel_size_m"] * conditions.voxel_factor
     return Evidence(
         shots=chain.shots(conditions),
-        cloud=classes.cloud,
+        cloud=cloud,
         leaves=meshes["leaf"],
         wood=meshes["wood"],
-        points_per_polygon=count_points(classes.points_m(LEAF), edge_m) if has_polygons else None,
+        points_per_polygon=count_points(leaves_m, edge_m) if has_polygons else None,
         voxels={n: grid for n, grid in voxels.items() if not isinstance(grid, InputError)},
         light={name: _dataset(pair[0], true_sky) for name, pair in light.items()},
         shifted_light={name: _dataset(pair[1], true_sky) for name, pair in light.items()},

@@ -41,9 +41,10 @@ class Conditions:
         Share of shots that is kept, by chance.
     drift_db : float
         Error of the reflectance calibration [dB].
-    classes : str
-        How leaf and wood are told apart: `reflectance`, `mixture`, `geometry`, `geometry_no_stem`
-        or `all_leaf`.
+    classifier : str or None
+        How leaf and wood are told apart (`cloud.classifiers`); None: as configured.
+    has_stem : bool
+        Whether the classifier sees the stem, to which branches lead.
     voxel_factor : float
         Edges of all voxels, those of polygons too, as a multiple of the configured ones.
     max_pad_m2_m3 : float or None
@@ -73,7 +74,8 @@ class Conditions:
     misregistration_m: float = 0.0
     kept_share: float = 1.0
     drift_db: float = 0.0
-    classes: str = "reflectance"
+    classifier: str | None = None
+    has_stem: bool = True
     voxel_factor: float = 1.0
     max_pad_m2_m3: float | None = None
     sensor_error_m: float = 0.0
@@ -103,7 +105,7 @@ STAGES = {
         "kept_share",
     ),
     "cloud": ("drift_db",),
-    "classes": ("classes",),
+    "classes": ("classifier", "has_stem"),
     "structure": ("voxel_factor", "max_pad_m2_m3"),
     "light": ("sensor_error_m", "sun_elevation_deg"),
     "sky": ("clock_offset_min", "diffuse_share"),
@@ -171,12 +173,9 @@ def _numbers(
     return Stressor(name, title, levels, float(harmless))
 
 
-def _named(name: str, title: str, field: str, values: dict[str, str]) -> Stressor:
+def _named(name: str, title: str, changes: dict[str, dict[str, Any]]) -> Stressor:
     """Levels without a natural number, numbered from the harmless one."""
-    levels = tuple(
-        Level(float(k), label, {field: value} if k else {})
-        for k, (label, value) in enumerate(values.items())
-    )
+    levels = tuple(Level(float(k), *one) for k, one in enumerate(changes.items()))
     return Stressor(name, title, levels, 0.0)
 
 
@@ -217,9 +216,8 @@ STRESSORS = {
         _named(
             "leaf_angles",
             "true leaf angles, spherical assumed",
-            "leaf_angles",
             {
-                name: name
+                name: {} if name == "spherical" else {"leaf_angles": name}
                 for name in ("spherical", "plagiophile", "erectophile", "uniform", "planophile")
             },
         ),
@@ -236,13 +234,12 @@ STRESSORS = {
         _named(
             "no_reflectance",
             "classes without calibrated reflectance",
-            "classes",
             {
-                "calibrated": "reflectance",
-                "from data": "mixture",
-                "geometry": "geometry",
-                "no stem": "geometry_no_stem",
-                "all leaf": "all_leaf",
+                "calibrated": {},
+                "from data": {"classifier": "mixture"},
+                "geometry": {"classifier": "geometry"},
+                "no stem": {"classifier": "geometry", "has_stem": False},
+                "all leaf": {"classifier": "all_leaf"},
             },
         ),
         _numbers(

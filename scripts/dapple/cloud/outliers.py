@@ -1,0 +1,92 @@
+"""Statistical outliers, by whichever program is there."""
+
+import tempfile
+from pathlib import Path
+
+import laspy
+import numpy as np
+
+from dapple import pdal as pdal_program
+from dapple.cloud import cloudcompare as cc
+from dapple.errors import InputError
+
+BACKENDS = ("cloudcompare", "pdal", "none")
+
+
+def inliers(
+    xyz_m: np.ndarray,
+    backend: str,
+    *,
+    neighbours: int = 8,
+    multiplier: float = 3.0,
+    pdal: str = "pdal",
+    cloudcompare: str = "CloudCompare",
+) -> tuple[np.ndarray, dict[str, str]]:
+    """Find the points that are no statistical outliers (Rusu et al. 2008).
+
+    Parameters
+    ----------
+    xyz_m : (n, 3) float64
+        Local frame [m].
+    backend : {"cloudcompare", "pdal", "none"}
+        Who finds them; `none` keeps all points.
+    neighbours : int
+        Number of nearest neighbours, the point itself not counted.
+    multiplier : float
+        A point is an outlier if its mean distance to its neighbours exceeds the mean over all
+        points by more than this many standard deviations.
+    pdal, cloudcompare : str
+        Name or path of the programs.
+
+    Returns
+    -------
+    (k,) int64
+        Ascending indices of the points that stay.
+    dict of str to str
+        Version of the program used, by its name.
+
+    Raises
+    ------
+    InputError
+        An unknown back end, or a program is absent.
+    ProgramError
+        PDAL or CloudCompare failed.
+
+    Notes
+    -----
+    Both compute the same statistic. CloudCompare stores coordinates and distances in single
+    precision and divides the variance by n, PDAL uses double precision and n - 1, so that a point
+    within about 1e-6 of the limit may be judged differently.
+    """
+    match backend:
+        case "none":
+            return np.arange(len(xyz_m)), {}
+        case "pdal":
+            kept = _by_pdal(xyz_m, neighbours, multiplier, pdal)
+            return kept, {"pdal": pdal_program.version(pdal)}
+        case "cloudcompare":
+            engine = cc.engine(cloudcompare)
+            kept = engine.inliers(xyz_m, neighbours, multiplier)
+            return kept, {engine.name: engine.version}
+    raise InputError(
+        "clean.outlier_backend",
+        repr(backend),
+        f"one of {', '.join(BACKENDS)}",
+        "Change the configuration.",
+    )
+
+
+def _by_pdal(xyz_m: np.ndarray, neighbours: int, multiplier: float, program: str) -> np.ndarray:
+    """Points travel as LAS about their middle, to a micrometre, with their row numbers."""
+    header = laspy.LasHeader(version="1.4", point_format=6)
+    header.add_extra_dim(laspy.ExtraBytesParams("Row", np.uint32))
+    header.scales = np.full(3, 1e-6)
+    points = laspy.LasData(header)
+    points.xyz = xyz_m - 0.5 * (np.min(xyz_m, axis=0) + np.max(xyz_m, axis=0))
+    points["Row"] = np.arange(len(xyz_m), dtype=np.uint32)
+    with tempfile.TemporaryDirectory(prefix="outliers-") as folder:
+        given, kept = Path(folder, "given.las"), Path(folder, "kept.las")
+        points.write(given)
+        stages = pdal_program.remove_outliers(neighbours, multiplier)
+        pdal_program.run([str(given), *stages, pdal_program.write_las(kept)], program)
+        return np.sort(laspy.read(kept)["Row"].astype(np.int64))
