@@ -27,11 +27,11 @@ def main(snakemake):
         seed = stream_seed(settings["seed"], "candidate", number)
         for beams in hemisphere.scan(world, stand, place_m, scanner, 1, seed):
             reach.add(beams, np.full(len(beams.range_m), 1 << number))
-    hit, passed = reach.joined()
+    hit, _ = reach.joined()
     print(f"{len(places_m)} places where a scanner can stand")
     grid_files.write(
         snakemake.output.reach,
-        {"seen": hit | passed},
+        {"hit": hit},
         positions_m=np.ravel(places_m),
         zenith_step_deg=scanner.zenith_step_deg,
         azimuth_step_deg=scanner.azimuth_steps_deg[0],

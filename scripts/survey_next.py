@@ -47,7 +47,7 @@ def main(snakemake):
     places_m = plan.places(
         guess, params.cell_size_m, scanned_m - corner_m, params.along, params.height_m
     )
-    chance = plan.chance_of_seeing(
+    chance = plan.chance_of_return(
         guess,
         places_m,
         cell_size_m=params.cell_size_m,

@@ -15,13 +15,13 @@ def main(snakemake):
     params = snakemake.params
     rows, places = [], []
     inputs = snakemake.input
-    for (stand, seed), truth_path, seen_path, cells_path in zip(
+    for (stand, seed), truth_path, scans_path, cells_path in zip(
         params.truths, inputs.truth, inputs.candidates, inputs.cells, strict=True
     ):
-        truth, scans = netcdf.read(truth_path), netcdf.read(seen_path)
+        truth, scans = netcdf.read(truth_path), netcdf.read(scans_path)
         first = voxel_grids.read(cells_path)
         filled = (truth.leaf_area_m2 + truth.wood_area_m2).values > 0
-        seen = scans.seen.values[filled].astype(np.uint32)
+        hit = scans.hit.values[filled].astype(np.uint32)
         positions_m = scans.attrs["positions_m"].reshape(-1, 3)
         size_m = first.attrs["voxel_size_m"]
         guess, _, _ = fill.krige(
@@ -31,7 +31,7 @@ def main(snakemake):
             range_m=params.range_m,
             neighbours=params.neighbours,
         )
-        chance = plan.chance_of_seeing(
+        chance = plan.chance_of_return(
             guess,
             positions_m,
             cell_size_m=size_m,
@@ -44,7 +44,7 @@ def main(snakemake):
             chance, guess, positions_m, params.volume_m, n, N_RANDOM, stream_seed(seed, stand)
         )
         for name, several in orders.items():
-            measured = np.mean([plan.measured_rs(seen, order) for order in several], axis=0)
+            measured = np.mean([plan.measured_rs(hit, order) for order in several], axis=0)
             for k, rs in enumerate(measured):
                 rows.append(
                     {

@@ -1,4 +1,4 @@
-"""What makes shadow: the same stands with other leaves, beams and rules for voxels."""
+"""What makes shadow: the same stands with other leaves, crowns, beams and rules for voxels."""
 
 import dataclasses
 
@@ -23,16 +23,23 @@ RIEGL = {  # as a VZ-400i: a narrow beam, a sensitive detector, several returns
     "max_returns": 4,
 }
 SMALL = {"leaf_length_min_m": 0.06, "leaf_length_max_m": 0.10}
-VARIANTS = {  # changes of the tree, of the scanner, and any face
+FINEST_DEG = 0.1
+"""Finest azimuth step: finer ones cost most."""
+VARIANTS = {  # changes of the stand, of the scanner, and any face
     "as in the survey": ({}, {}, False),
     "any face counts": ({}, {}, True),
     "thin beam": ({}, {"beam_divergence_mrad": 0.0, "exit_aperture_m": 0.0, "sub_rays": 1}, False),
+    "twice the divergence": ({}, {"beam_divergence_mrad": 8.8}, False),
+    "half of the energy": ({}, {"min_energy": 0.05}, False),
     "VZ-400i, four returns": ({}, RIEGL, False),
     "VZ-400i, first return": ({}, RIEGL | {"max_returns": 1}, False),
     "leaves of 14 to 22 cm": (LARGE, {}, False),
     "leaves of 6 to 10 cm": (SMALL, {}, False),
     "400 clumps": ({"n_clumps": 400}, {}, False),
     "60 clumps": ({"n_clumps": 60}, {}, False),
+    "crowns from 14 m": ({"crown_base_m": 14.0}, {}, False),
+    "crowns of 2.3 m radius": ({"crown_radius_m": 2.3}, {}, False),
+    "half of the leaves": ({"leaf_area_index": 2.4}, {}, False),
 }
 
 
@@ -43,7 +50,7 @@ def main(snakemake):
         for name, (tree, beam, any_face) in VARIANTS.items():
             if tree and tree.items() <= SPECIES[species].items():
                 continue  # that is what the species is like
-            stand = stands.grow(species, **stand_settings, **tree)
+            stand = stands.grow(species, **stand_settings | tree)
             rows += [
                 {"stand": species, "variant": name} | row
                 for row in scanned(stand, settings, beam, any_face)
@@ -54,7 +61,9 @@ def main(snakemake):
 def scanned(stand, settings, beam, any_face):
     """Shadow, and regression of well covered cells, of the designs with one and five scans."""
     size_m = settings["voxel_size_m"]
-    scanner = dataclasses.replace(Hemisphere(**settings["scanner"]), **beam)
+    scanner = Hemisphere(**settings["scanner"])
+    steps_deg = tuple(step for step in scanner.azimuth_steps_deg if step >= FINEST_DEG - 1e-9)
+    scanner = dataclasses.replace(scanner, azimuth_steps_deg=steps_deg, **beam)
     filled = sum(stands.area_in_voxels(stand, part, size_m) for part in ("leaves", "wood")) > 0
     per_edge = voxels_per_cell(settings["cell_size_m"], size_m)
     truth = shadow.in_cells(filled, per_edge)

@@ -5,7 +5,7 @@ Needs   nothing
 Makes   survey/{stand}_{replicate}/truth.nc          leaf and wood area of every voxel
         survey/{stand}_{replicate}/{design}.nc       voxels hit and passed, at every density
         survey/{stand}_{replicate}/{design}_cells.nc plant area density by likelihood
-        survey/{stand}_{replicate}/candidates.nc     voxels seen from each candidate position
+        survey/{stand}_{replicate}/candidates.nc     voxels hit from each candidate position
         survey/variants.csv                          on request: other leaves, beams and rules
 """
 

@@ -123,11 +123,11 @@ def test_scanners_stand_in_the_open(scene, place, found):
         hemisphere.check_position(scene[1], scene[0], np.array(place, float))
 
 
-def test_shadow_is_what_no_beam_reached():
+def test_relative_shadow_is_what_sent_no_return_passed_or_not():
     found = np.array([HIT, PASSED, UNSEEN, UNSEEN, HIT]).reshape(5, 1, 1)
     filled = np.array([1, 1, 1, 1, 0], bool).reshape(5, 1, 1)
     shares = shadow.relative_shadow(found, filled)
-    assert shares == {"rs": 0.5, "not_hit": 0.75, "false_hits": 0.5}
+    assert shares == {"rs": 0.75, "unreached": 0.5, "false_hits": 0.5}
 
 
 def test_an_empty_stand_has_no_shadow():
@@ -207,16 +207,29 @@ def test_foliage_hides_what_is_behind_it_as_beer_says():
     density = np.zeros((9, 1, 1))
     density[3:5] = 0.8
     place = np.array([[0.0, 0.5, 0.4]])
-    seen = plan.chance_of_seeing(density, place, views=1.0, step_m=0.01, **SCAN)[0, :, 0, 0]
-    assert seen[:3] == pytest.approx(1.0)
-    assert seen[5:] == pytest.approx(np.exp(-0.5 * 0.8 * 2), rel=0.02)
+    options = {"views": 1.0, "shown": 1.0, "step_m": 0.01}
+    chance = plan.chance_of_return(density, place, **options, **SCAN)[0, :, 0, 0]
+    assert chance[:3] == pytest.approx(1.0)
+    assert chance[5:] == pytest.approx(np.exp(-0.5 * 0.8 * 2), rel=0.02)
+
+
+def test_a_beam_through_a_voxel_may_miss_what_is_in_it():
+    """Beams as many as fall on a voxel of 10 cm at 1.5 m, each with a chance of a tenth."""
+    place = np.array([[0.5, 0.5, 0.4]])
+    chance = plan.chance_of_return(np.zeros((3, 1, 1)), place, shown=0.1, **SCAN)[0, :, 0, 0]
+    away = np.array([1.0, 2.0])
+    distance = np.hypot(away, 0.1)
+    step = np.radians([SCAN["zenith_step_deg"], SCAN["azimuth_step_deg"]])
+    beams = (SCAN["voxel_size_m"] / distance) ** 2 / (step.prod() * away / distance)
+    assert beams.min() > 3
+    assert chance[1:] == pytest.approx(1 - 0.9**beams, rel=1e-6)
 
 
 def test_the_planner_takes_the_side_that_the_first_scan_cannot_see():
     density = np.zeros((9, 3, 3))
     density[4] = 5.0
     places = np.array([[0.5, 1.5, 0.1], [1.5, 1.5, 0.1], [8.5, 1.5, 0.1]])
-    chance = plan.chance_of_seeing(density, places, **SCAN)
+    chance = plan.chance_of_return(density, places, **SCAN)
     order, expected = plan.choose(chance, np.ones_like(density), 2, taken=(0,))
     assert order == [0, 2]
     assert expected[1] < expected[0]
@@ -228,8 +241,8 @@ def test_more_scans_than_candidates_are_refused():
 
 
 def test_measured_shadow_adds_up_scans():
-    seen = np.array([0b00, 0b01, 0b10, 0b11], np.uint32)
-    assert plan.measured_rs(seen, [1, 0]) == [0.5, 0.25]
+    hit = np.array([0b00, 0b01, 0b10, 0b11], np.uint32)
+    assert plan.measured_rs(hit, [1, 0]) == [0.5, 0.25]
 
 
 def test_designs_have_the_centre_first_and_unknown_ones_are_refused():

@@ -1,4 +1,4 @@
-"""Choose the next scan positions by what they are expected to see."""
+"""Choose the next scan positions by the returns that they are expected to bring."""
 
 import numpy as np
 from numba import njit, prange
@@ -7,7 +7,7 @@ from dapple.errors import InputError
 from dapple.survey.designs import candidates, positions
 
 
-def chance_of_seeing(
+def chance_of_return(
     density_m2_m3: np.ndarray,
     positions_m: np.ndarray,
     *,
@@ -17,9 +17,10 @@ def chance_of_seeing(
     azimuth_step_deg: float,
     projection: float = 0.5,
     views: float = 3.0,
+    shown: float = 0.2,
     step_m: float = 0.25,
 ) -> np.ndarray:
-    """Chance that a scan from each position reaches a voxel in the middle of each cell.
+    """Chance that a scan from each position has a return from a filled voxel amid each cell.
 
     Parameters
     ----------
@@ -28,13 +29,16 @@ def chance_of_seeing(
     positions_m : (p, 3) float64
         Scanners [m].
     cell_size_m, voxel_size_m : float
-        Edges of the density's cells and of the voxels that are to be seen [m].
+        Edges of the density's cells and of the voxels that are to be hit [m].
     zenith_step_deg, azimuth_step_deg : float
         Of the scan.
     projection : float
         Mean projection G of a leaf.
     views : float
         Beams to one voxel that meet different leaves on their way; more of them see the same gaps.
+    shown : float
+        Share of the section of a filled voxel that its leaves darken: the chance that a beam which
+        comes so far meets them.
     step_m : float
         Steps in which density is added up along the line of sight [m].
 
@@ -62,8 +66,11 @@ def chance_of_seeing(
     distance = np.linalg.norm(away, axis=-1)
     sine = np.maximum(np.hypot(away[..., 0], away[..., 1]) / distance, 1e-3)
     beam_sr = np.radians(zenith_step_deg) * np.radians(azimuth_step_deg) * sine
-    beams = np.minimum((voxel_size_m / distance) ** 2 / beam_sr, views)
-    chance = np.where(beams < 1, beams * through, 1 - (1 - through) ** np.maximum(beams, 1))
+    beams = (voxel_size_m / distance) ** 2 / beam_sr
+    groups = np.clip(beams, 1, views)
+    beams_of_one = np.maximum(beams, 1) / groups
+    of_a_view = 1 - (1 - shown) ** beams_of_one
+    chance = np.minimum(beams, 1) * (1 - (1 - through * of_a_view) ** groups)
     return np.where(away[..., 2] > 0, chance, 0.0)  # beams leave upwards only
 
 
@@ -98,7 +105,7 @@ def choose(
     Parameters
     ----------
     chance : (p, ...) float64
-        From `chance_of_seeing`; positions are taken to see independently of each other.
+        From `chance_of_return`; positions are taken to see independently of each other.
     weight : (...) float64
         How much foliage each cell is expected to hold.
     n : int
@@ -125,36 +132,36 @@ def choose(
             "no more scans than candidates, and some foliage",
             "Take fewer scans or more candidates.",
         )
-    unseen = np.ones(chance.shape[1:])
+    shadowed = np.ones(chance.shape[1:])
     order: list[int] = []
     expected = []
     for turn in range(n):
         if turn < len(taken):
             best = taken[turn]
         else:
-            gain = np.array([(weight * unseen * one).sum() for one in chance])
+            gain = np.array([(weight * shadowed * one).sum() for one in chance])
             gain[order] = -1.0
             best = int(np.argmax(gain))
         order.append(best)
-        unseen = unseen * (1 - chance[best])
-        expected.append(float((weight * unseen).sum() / weight.sum()))
+        shadowed = shadowed * (1 - chance[best])
+        expected.append(float((weight * shadowed).sum() / weight.sum()))
     return order, expected
 
 
-def measured_rs(seen: np.ndarray, order: list[int]) -> list[float]:
+def measured_rs(hit: np.ndarray, order: list[int]) -> list[float]:
     """Relative shadow after each scan of an order.
 
     Parameters
     ----------
-    seen : (v,) unsigned integer
-        Of every filled voxel: bit p is set where position p reached it.
+    hit : (v,) unsigned integer
+        Of every filled voxel: bit p is set where position p has a return from it.
     order : list of int
         Positions.
     """
     mask, result = 0, []
     for position in order:
         mask |= 1 << position
-        result.append(float(np.mean(seen & seen.dtype.type(mask) == 0)))
+        result.append(float(np.mean(hit & hit.dtype.type(mask) == 0)))
     return result
 
 

@@ -1,4 +1,8 @@
-"""How much of a stand a scan leaves in shadow."""
+"""How much of a stand a scan leaves in shadow.
+
+Van der Zande et al. (2008) call relative shadow the share of the truly filled voxels that have no
+return: those that beams only passed count as shadow too. What no beam reached is less.
+"""
 
 import numpy as np
 
@@ -33,16 +37,17 @@ def relative_shadow(attribute: np.ndarray, filled: np.ndarray) -> dict[str, floa
     Returns
     -------
     dict
-        `rs`, filled voxels that no beam reached; `not_hit`, filled voxels without a return, though
-        beams may have passed them; `false_hits`, the share of returns' voxels that hold nothing.
+        `rs`, relative shadow: filled voxels without a return, passed by beams or not;
+        `unreached`, filled voxels that no beam hit or passed; `false_hits`, the share of returns'
+        voxels that hold nothing.
     """
     of_filled = attribute[filled]
     if not len(of_filled):
         raise InputError("survey.stands", "no filled voxel", "a stand", "It holds nothing to see.")
     hit = attribute == HIT
     return {
-        "rs": float((of_filled == UNSEEN).mean()),
-        "not_hit": float((of_filled != HIT).mean()),
+        "rs": float((of_filled != HIT).mean()),
+        "unreached": float((of_filled == UNSEEN).mean()),
         "false_hits": float((~filled[hit]).mean()) if hit.any() else 0.0,
     }
 
@@ -64,6 +69,6 @@ def shadow_map(
     nx, ny = (count // per_edge for count in filled.shape[:2])
     shape = (nx, per_edge, ny, per_edge, -1)
     n_filled = filled[:, :, layer].reshape(shape).sum(axis=(1, 3, 4))
-    unseen = (filled & (attribute == UNSEEN))[:, :, layer].reshape(shape).sum(axis=(1, 3, 4))
+    shadowed = (filled & (attribute != HIT))[:, :, layer].reshape(shape).sum(axis=(1, 3, 4))
     with np.errstate(invalid="ignore"):
-        return np.where(n_filled > 0, unseen / n_filled, np.nan)
+        return np.where(n_filled > 0, shadowed / n_filled, np.nan)
