@@ -240,6 +240,31 @@ def test_more_scans_than_candidates_are_refused():
         plan.choose(np.ones((2, 1, 1, 1)), np.ones((1, 1, 1)), 3)
 
 
+def test_orders_start_in_the_centre_and_hold_the_designs():
+    places_m = np.array(designs.candidates((4.0, 4.0, 8.0), 1.3, 3))
+    chance = np.full((9, 4, 4, 8), 0.5)
+    orders, expected = plan.orders(
+        chance, np.ones((4, 4, 8)), places_m, (4.0, 4.0, 8.0), 5, 2, seed=1
+    )
+    assert {name: len(several) for name, several in orders.items()} == {
+        "planner": 1, "diamond": 1, "corners": 1, "random": 2
+    }  # fmt: skip
+    assert all(order[0] == 4 for several in orders.values() for order in several)
+    assert sorted(map(tuple, places_m[orders["corners"][0][1:], :2])) == [
+        (0, 0), (0, 4), (4, 0), (4, 4)
+    ]  # fmt: skip
+    assert expected == pytest.approx([0.5**k for k in range(1, 6)])
+
+
+def test_new_places_are_free_and_apart_from_the_scans():
+    density = np.zeros((4, 4, 2))
+    density[0, 0] = 5.0
+    found = plan.places(density, 1.0, np.array([[4.0, 4.0, 1.5]]), 3, 1.3)
+    assert found[0].tolist() == [4.0, 4.0, 1.5]
+    assert len(found) == 1 + 9 - 2
+    assert (found[:, 2] == 1.5).all()
+
+
 def test_measured_shadow_adds_up_scans():
     hit = np.array([0b00, 0b01, 0b10, 0b11], np.uint32)
     assert plan.measured_rs(hit, [1, 0]) == [0.5, 0.25]

@@ -200,7 +200,8 @@ def orders(
     by_design = {}
     for design in ("diamond", "corners"):
         distance = np.linalg.norm(
-            positions(design, volume_m, 0.0)[:, None, :2] - positions_m[None, :, :2], axis=-1
+            np.array(positions(design, volume_m, 0.0))[:, None, :2] - positions_m[None, :, :2],
+            axis=-1,
         )
         found = distance.argmin(axis=1)[distance.min(axis=1) < 1e-6]
         by_design[design] = [[int(p) for p in found[:n]]]
@@ -243,7 +244,7 @@ def places(
     """
     size_m = np.array(density_m2_m3.shape) * cell_size_m
     height_m = float(scanned_m[:, 2].mean()) if len(scanned_m) else height_m
-    grid_m = candidates(size_m, height_m, along)
+    grid_m = np.array(candidates(size_m, height_m, along))
     index = np.clip((grid_m / cell_size_m).astype(int), 0, np.array(density_m2_m3.shape) - 1)
     free = density_m2_m3[tuple(index.T)] <= densest_m2_m3
     between = np.linalg.norm(grid_m[:, None, :2] - scanned_m[None, :, :2], axis=-1)
