@@ -21,8 +21,9 @@ from dapple.formats import json, meshes, tables
 from dapple.light import series, transport, visibility
 from dapple.scene import scene_optics, traced
 from dapple.scene.surfaces import Scene, of_kinds
+from dapple.sky.radiation_series import broadband
 from dapple.sky.sky_radiance import sky_dataset
-from dapple.sky.sun import Site, broadband
+from dapple.sky.sun import Site
 from dapple.stats import correlation, measured
 from dapple.stats.pairs import pair
 from dapple.streams import stream_seed
@@ -69,7 +70,8 @@ class Run:
         self.registration = json.read(folder / "registration/registration.json")
         self.optics = scene_optics.read(folder / "sky/optics.nc")
         table = tables.read(folder / "sky/sensors.csv")
-        records = measured.read(Path(self.settings.data_dir) / self.settings.measured.path)
+        path = Path(self.settings.data_dir) / self.settings.measured.path
+        records = measured.read(path, sensors=table, **self.settings.measured.table()).table
         self.records = records[~records["sensor"].isin(self.registration["fitting_sensors"])]
         self.sensors = table[table["sensor"].isin(self.records["sensor"])].reset_index(drop=True)
         times = time_range(**dict(self.settings.time) | {"step_min": step_min})
@@ -80,16 +82,13 @@ class Run:
         self.sky = self.sky_at()
 
     def sky_at(self, model: str = "perez", kind: str = "table"):
-        columns = self.settings.radiation.model_dump(
-            include={"time_column", "global_column", "diffuse_column", "timezone"}
-        )
+        columns = self.settings.radiation.broadband() | {"kind": kind}
         site = Site(**self.settings.site.model_dump(exclude={"timezone"}))
         path = Path(self.settings.data_dir) / self.settings.radiation.path
-        given = columns if kind == "table" else {}
         return sky_dataset(
             self.times,
             site,
-            broadband(self.times, site, kind=kind, path=path, **given),
+            broadband(self.times, site, path=path, **columns).values,
             model=model,
         )
 

@@ -22,8 +22,9 @@ from dapple.formats import json, meshes
 from dapple.registration import shading
 from dapple.scene import sensors
 from dapple.scene.surfaces import Scene, of_kinds
+from dapple.sky.radiation_series import broadband
 from dapple.sky.sky_radiance import sky_dataset
-from dapple.sky.sun import Site, broadband
+from dapple.sky.sun import Site
 from dapple.stats import measured
 from dapple.streams import stream_seed
 from dapple.virtual.leaves import along_wood
@@ -42,17 +43,19 @@ def main() -> None:
     fitting = json.read(options.folder / "registration/registration.json")["fitting_sensors"]
     wood = meshes.read_ply(options.folder / "structure/polygons/wood.ply")
     data = Path(settings.data_dir)
-    table = sensors.read(data / settings.sensors.path, settings.registration.origin_m)
-    records = measured.read(data / settings.measured.path, sensors=table)
+    table = sensors.read(
+        data / settings.sensors.path, settings.registration.origin_m, **settings.sensors.table()
+    )
+    path = data / settings.measured.path
+    records = measured.read(path, sensors=table, **settings.measured.table()).table
     records = records[records["sensor"].isin(fitting)]
     site = Site(**settings.site.model_dump(exclude={"timezone"}))
-    columns = settings.radiation.model_dump(
-        include={"time_column", "global_column", "diffuse_column", "timezone"}
-    )
+    columns = settings.radiation.broadband()
 
     def sky_at(times):
         path = data / settings.radiation.path
-        return sky_dataset(times, site, broadband(times, site, kind="table", path=path, **columns))
+        radiation = broadband(times, site, path=path, **columns)
+        return sky_dataset(times, site, radiation.values)
 
     print("max_distance_m  thin_wood_m2  r_fit  east_m  north_m  clock_s", flush=True)
     rows = []

@@ -35,17 +35,10 @@ VARIANT = f"{settings.light.variant}_ad"
 REFERENCE_TIMES = TIMES[
     :: max(1, round(settings.light.timestep.step_min / settings.time.step_min))
 ]
-ATMOSPHERE = {
-    "precipitable_water_cm",
-    "ozone_atm_cm",
-    "aerosol_optical_depth_500nm",
-    "ground_albedo",
-}
 SKY = {
     "site": settings.site.model_dump(exclude={"timezone"}),
-    "radiation": settings.radiation.model_dump(exclude={"path", "sky", *ATMOSPHERE}),
-    "atmosphere": {"model": settings.radiation.sky}
-    | settings.radiation.model_dump(include=ATMOSPHERE),
+    "radiation": settings.radiation.broadband(),
+    "atmosphere": settings.radiation.atmosphere(),
 }
 REFERENCE = settings.light.timestep.model_dump(exclude={"step_min"}) | {
     "sun_diameter_deg": settings.light.sun_diameter_deg,
@@ -105,10 +98,23 @@ def data(path):
     return local(str(file))
 
 
+def data_files(path):
+    """A file of real data, or all that a pattern with `*` finds, in the order of their names."""
+    if "*" not in path:
+        return [data(path)]
+    found = sorted(Path(settings.data_dir).glob(path))
+    if not found:
+        sys.exit(
+            f"dapple: {settings.data_dir}: found no file like {path}; expected at least one. "
+            "Correct the pattern or data_dir."
+        )
+    return [local(str(file)) for file in found]
+
+
 def optics():
     """Spectra as the configuration has them, tables as files."""
     spectra = settings.optics.model_dump()
-    for surface in ("bark", "ground"):
+    for surface in ("leaf", "bark", "ground"):
         if spectra[surface]["path"]:
             spectra[surface]["path"] = data(spectra[surface]["path"])
     return spectra

@@ -166,6 +166,7 @@ rule ground_map:
         mem_mb=4000,
     params:
         times=settings.figures.map_times,
+        timezone=settings.time.timezone,
         spacing_m=settings.figures.map_spacing_m,
         margin_m=settings.figures.map_margin_m,
         engine=REFERENCE,

@@ -11,7 +11,7 @@ rule registration:
         leaves=leaf_meshes("polygons") if settings.registration.fit else [],
         wood=results("structure/polygons/wood.ply") if settings.registration.fit else [],
         sensors=data(settings.sensors.path) if settings.registration.fit else [],
-        measured=data(settings.measured.path) if settings.registration.fit else [],
+        measured=data_files(settings.measured.path) if settings.registration.fit else [],
         radiation=(
             data(settings.radiation.path)
             if settings.registration.fit and settings.radiation.kind == "table"
@@ -32,6 +32,8 @@ rule registration:
     params:
         **dict(settings.registration),
         **(SKY if settings.registration.fit else {}),
+        sensors=settings.sensors.table(),
+        records=settings.measured.table(),
         variant=f"{VARIANT}_rgb",
         seed=stream("registration"),
     message:

@@ -3,7 +3,9 @@ Sky: what light reaches the tree, and what leaf, bark and meadow do with it.
 
 Needs   the configuration; with radiation.kind: table, global and diffuse irradiance
 Makes   sky/sky.nc         sun, direct and diffuse photon flux per band, sky radiance coefficients
+        sky/radiation.json what was read of radiation, what was noticed, what was modelled
         sky/optics.nc      reflectance and transmittance per band
+        sky/optics.json    what was noticed about spectra
         sky/sensors.csv    the sensors in the local frame
 """
 
@@ -17,6 +19,7 @@ rule sky:
         code=code("sky"),
     output:
         sky=results("sky/sky.nc"),
+        radiation=results("sky/radiation.json"),
     log:
         logs("sky"),
     benchmark:
@@ -40,12 +43,17 @@ rule optics:
     input:
         tables=[
             data(s.path)
-            for s in (settings.optics.bark, settings.optics.ground)
+            for s in (
+                settings.optics.leaf,
+                settings.optics.bark,
+                settings.optics.ground,
+            )
             if s.path
         ],
         code=code("optics"),
     output:
         optics=results("sky/optics.nc"),
+        facts=results("sky/optics.json"),
     log:
         logs("optics"),
     benchmark:
@@ -82,7 +90,9 @@ rule sensors:
     resources:
         mem_mb=1000,
     params:
-        **settings.sensors.model_dump(exclude={"path"}),
+        kind=settings.sensors.kind,
+        table=settings.sensors.table(),
+        grid=settings.sensors.grid(),
         ground_z_m=settings.ground_z_m,
     message:
         said("sensors in the local frame")

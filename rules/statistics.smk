@@ -2,7 +2,8 @@
 Statistics: how well simulated light matches measured light, and what it cost.
 
 Needs   light/{reconstruction}.nc and the records, or the virtual truth
-Makes   statistics/records.csv        measured and simulated PAR side by side, fitting and reporting part named
+Makes   statistics/records.json       what was read of the records, and what was noticed
+        statistics/records.csv        measured and simulated PAR side by side, fitting and reporting part named
         statistics/overall.csv        one line a reconstruction, reporting part only
         statistics/per_sensor.csv     one line a sensor
         statistics/agreement.csv      transport engine against the per-timestep engine
@@ -16,13 +17,17 @@ rule records:
         light=[results(f"light/{name}.nc") for name in COMPARED],
         truth=results("light/truth.nc") if settings.measured.kind == "virtual" else [],
         measured=(
-            data(settings.measured.path) if settings.measured.kind == "table" else []
+            data_files(settings.measured.path)
+            if settings.measured.kind == "table"
+            else []
         ),
+        sensors=results("sky/sensors.csv"),
         sky=results("sky/sky.nc"),
         registration=results("registration/registration.json"),
         code=code("records"),
     output:
         records=results("statistics/records.csv"),
+        facts=results("statistics/records.json"),
     log:
         logs("records"),
     benchmark:
@@ -33,7 +38,9 @@ rule records:
     resources:
         mem_mb=1000,
     params:
-        **settings.measured.model_dump(exclude={"path"}),
+        kind=settings.measured.kind,
+        table=settings.measured.table(),
+        sensor_model=settings.measured.sensor_model(),
         reconstructions=COMPARED,
         seed=stream("records"),
     message:

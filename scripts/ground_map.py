@@ -17,7 +17,7 @@ LIFT_M = 0.01
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
     sky = netcdf.read(inputs.sky)
-    chosen = spread(netcdf.times(sky), params.times, count=4)
+    chosen = spread(netcdf.times(sky), params.times, 4, params.timezone)
     # One placement is what stands there at a time; a mean would blur its flecks.
     scene = scene_files.read(inputs.leaves[:1], inputs.wood, params.ground_z_m)[0]
     low, high = scene.bounds_m

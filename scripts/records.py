@@ -3,10 +3,13 @@
 import numpy as np
 import pandas as pd
 
+from dapple import findings
 from dapple.formats import json, netcdf, tables
 from dapple.light.series import open_sky_par
-from dapple.stats import measured
+from dapple.stats import measured, plausible_records
+from dapple.stats.measured import Records
 from dapple.stats.pairs import pair
+from dapple.virtual.sensor_model import simulate
 from dapple.workflow import run
 
 
@@ -14,22 +17,17 @@ def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
     registration = json.read(inputs.registration)
     if params.kind == "virtual":
-        records = measured.simulate(
-            netcdf.read(inputs.truth),
-            noise_relative=params.noise_relative,
-            noise_umol_m2_s=params.noise_umol_m2_s,
-            calibration_relative=params.calibration_relative,
-            clock_offset_s=params.clock_offset_s,
-            seed=params.seed,
-        )
+        truth = netcdf.read(inputs.truth)
+        records = Records(simulate(truth, **params.sensor_model, seed=params.seed))
     else:
-        records = measured.read(inputs.measured)
+        places = tables.read(inputs.sensors)
+        records = measured.read(inputs.measured, sensors=places, **params.table)
     sky = open_sky_par(netcdf.read(inputs.sky))
     table = pd.concat(
         [
             pair(
                 netcdf.read(path),
-                records,
+                records.table,
                 sky,
                 reconstruction=name,
                 clock_offset_s=registration["clock_offset_s"],
@@ -43,6 +41,10 @@ def main(snakemake):
         fitted |= table["time"] <= pd.Timestamp(until)
     table["part"] = np.where(fitted, "fitting", "reporting")
     tables.write(snakemake.output.records, table, "%.3f")
+    noticed = [*records.findings, *plausible_records.check(table, records.table)]
+    findings.say(noticed)
+    facts = {"kind": params.kind, **records.facts, "findings": findings.rows(noticed)}
+    json.write(snakemake.output.facts, facts)
 
 
 if __name__ == "__main__":

@@ -5,8 +5,9 @@ import numpy as np
 from dapple.formats import json
 from dapple.registration import shading
 from dapple.scene import scene_files, sensors
+from dapple.sky.radiation_series import broadband
 from dapple.sky.sky_radiance import sky_dataset
-from dapple.sky.sun import Site, broadband
+from dapple.sky.sun import Site
 from dapple.stats import measured
 from dapple.workflow import run
 
@@ -21,13 +22,13 @@ def main(snakemake):
 
     def sky_at(times):
         radiation = broadband(times, site, path=inputs.radiation or None, **params.radiation)
-        return sky_dataset(times, site, radiation, **params.atmosphere)
+        return sky_dataset(times, site, radiation.values, **params.atmosphere)
 
-    table = sensors.read(inputs.sensors, params.origin_m)
+    table = sensors.read(inputs.sensors, params.origin_m, **params.sensors)
     found = shading.register(
         scene_files.read(inputs.leaves, inputs.wood),
         table,
-        measured.read(inputs.measured, sensors=table),
+        measured.read(inputs.measured, sensors=table, **params.records).table,
         sky_at=sky_at,
         max_shift_m=params.max_shift_m,
         max_clock_offset_s=params.max_clock_offset_s,

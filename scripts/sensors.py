@@ -10,14 +10,11 @@ def main(snakemake):
     wood = meshes.read_ply(inputs.wood)
     if params.kind == "table":
         origin_m = json.read(inputs.registration)["origin_m"]
-        table = sensors.read(inputs.table, origin_m)
+        table = sensors.read(inputs.table, origin_m, **params.table)
     else:
         table = sensors.grid_around(
             sensors.stem_position(wood),
-            columns=params.columns,
-            rows=params.rows,
-            spacing_m=params.spacing_m,
-            height_m=params.height_m,
+            **params.grid,
             ground_z_m=params.ground_z_m,
         )
     for path in inputs.leaves:

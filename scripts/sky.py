@@ -2,9 +2,11 @@
 
 import pandas as pd
 
+from dapple import findings
 from dapple.formats import json, netcdf
+from dapple.sky.radiation_series import broadband
 from dapple.sky.sky_radiance import sky_dataset
-from dapple.sky.sun import Site, broadband
+from dapple.sky.sun import Site
 from dapple.times import time_range
 from dapple.workflow import run
 
@@ -16,8 +18,11 @@ def main(snakemake):
     # The times are the loggers'; their clock may have been ahead of the true time.
     times = time_range(**params.time) - pd.Timedelta(seconds=registration["clock_offset_s"])
     radiation = broadband(times, site, path=snakemake.input.radiation or None, **params.radiation)
-    sky = sky_dataset(times, site, radiation, **params.atmosphere)
+    findings.say(radiation.findings)
+    sky = sky_dataset(times, site, radiation.values, **params.atmosphere)
     netcdf.write(snakemake.output.sky, sky)
+    facts = radiation.facts | {"findings": findings.rows(radiation.findings)}
+    json.write(snakemake.output.radiation, facts)
 
 
 if __name__ == "__main__":

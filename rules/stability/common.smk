@@ -36,10 +36,10 @@ def stability_setup():
         "polygons": settings.polygons.model_dump(),
         "voxels": settings.voxels.model_dump(exclude={"sizes_m"}),
         "leaves": settings.leaves.model_dump(),
-        "sensors": settings.sensors.model_dump(exclude={"kind", "path"}),
+        "sensors": settings.sensors.grid(),
         "site": SKY["site"],
         "time": dict(settings.time),
-        "radiation": SKY["radiation"],
+        "radiation": {"linke_turbidity": settings.radiation.linke_turbidity},
         "atmosphere": SKY["atmosphere"],
         "ground_z_m": settings.ground_z_m,
         "light": {

@@ -1,14 +1,10 @@
-"""The only place that converts axes, directions, offsets and time zones.
+"""The only place that converts axes, directions and offsets.
 
 Everywhere else: metres, right-handed, x east, y north, z up, a local origin subtracted;
-azimuth clockwise from north, zenith from straight up, and time in UTC.
+azimuth clockwise from north, zenith from straight up.
 """
 
 import numpy as np
-import pandas as pd
-
-from dapple.errors import InputError
-from dapple.timezones import find_timezone
 
 FLOAT32_LIMIT_M = 8192.0
 """Up to here neighbouring float32 numbers are at most 1 mm apart (2**13 m, 24 bits)."""
@@ -129,60 +125,3 @@ def dart_to_local(abc_m: np.ndarray) -> np.ndarray:
     """A vertex `v a b c` of a DART OBJ file to local (east, north, up): (c, a, b)."""
     a, b, c = np.moveaxis(np.asarray(abc_m, float), -1, 0)
     return np.stack([c, a, b], axis=-1)
-
-
-# --- time -----------------------------------------------------------------------------------
-
-
-def to_utc(timestamps, timezone_name: str | None, where: str = "timestamps") -> pd.DatetimeIndex:
-    """Timestamps as time-zone aware UTC.
-
-    Parameters
-    ----------
-    timestamps : array_like of str, datetime or Timestamp
-        With a zone of their own, or naive.
-    timezone_name : str or None
-        The zone in which naive timestamps were written: IANA name or `+hh:mm`.
-    where : str
-        File or key to name in errors.
-
-    Returns
-    -------
-    DatetimeIndex
-        In UTC, as many and in the same order.
-
-    Raises
-    ------
-    InputError
-        A naive timestamp and no zone; an unknown zone; text that is no time; a wall-clock time
-        that daylight saving makes twofold or skips.
-    """
-    zone = None if timezone_name is None else find_timezone(timezone_name, where)
-    try:
-        index = pd.DatetimeIndex(pd.to_datetime(list(timestamps)))
-    except (ValueError, TypeError) as error:
-        raise InputError(
-            where,
-            f"text that is no time, or a mix of zones ({error})",
-            "ISO 8601 times such as 2023-08-10T12:30:00",
-            "Write all times of the column in one form.",
-        ) from error
-    if index.tz is not None:
-        return index.tz_convert("UTC")
-    if zone is None:
-        raise InputError(
-            where,
-            f"the naive timestamp {index[0] if len(index) else ''}".strip(),
-            "a time zone",
-            "Declare the zone in which the times were written, for example 'UTC' or "
-            "'Europe/Berlin', or write the offset into them (2023-08-10T12:30:00+02:00).",
-        )
-    try:
-        return index.tz_localize(zone).tz_convert("UTC")
-    except ValueError as error:
-        raise InputError(
-            where,
-            f"a time that daylight saving makes ambiguous or skips ({error})",
-            f"wall-clock times that exist once in {timezone_name}",
-            "Write the times in UTC, or with a fixed offset such as +01:00.",
-        ) from error

@@ -54,7 +54,7 @@ def world() -> Chain:
         sensors={"columns": 8, "rows": 8, "spacing_m": 0.45, "height_m": 0.1},
         site=settings.site.model_dump(exclude={"timezone"}),
         time=dict(settings.time) | {"step_min": 20.0},
-        radiation={"kind": "clear_sky"},
+        radiation={"linke_turbidity": 3.0},
         atmosphere=atmosphere,
         light=LIGHT,
     )

@@ -1,11 +1,9 @@
 """North is y, azimuth turns clockwise, and a time without a zone is refused."""
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from dapple import frames
-from dapple.errors import InputError
 
 
 @pytest.mark.parametrize(
@@ -79,38 +77,3 @@ def test_axes_of_other_programs_are_rotations_so_that_faces_keep_their_side(ther
     xyz = np.random.default_rng(1).normal(size=(5, 3))
     assert back(there(xyz)) == pytest.approx(xyz)
     assert np.linalg.det(there(np.eye(3))) == pytest.approx(1.0)
-
-
-def test_summer_time_in_freiburg_is_two_hours_ahead_of_utc():
-    utc = frames.to_utc(["2023-08-10 12:30", "2023-12-10 12:30"], "Europe/Berlin")
-    assert [str(t) for t in utc] == ["2023-08-10 10:30:00+00:00", "2023-12-10 11:30:00+00:00"]
-
-
-def test_a_zone_in_the_timestamps_wins_over_the_declared_one():
-    utc = frames.to_utc(["2023-08-10T12:30:00-06:00"], "Europe/Berlin")
-    assert utc[0] == pd.Timestamp("2023-08-10 18:30", tz="UTC")
-
-
-def test_a_fixed_offset_is_a_zone():
-    assert frames.to_utc(["2023-08-10 12:30"], "-03:30")[0].hour == 16
-
-
-def test_a_naive_time_without_a_zone_is_refused():
-    with pytest.raises(InputError, match=r"par.csv: found the naive timestamp 2023-08-10 12:30:00"):
-        frames.to_utc(["2023-08-10 12:30"], None, where="par.csv")
-
-
-def test_an_unknown_zone_names_the_nearest_valid_one():
-    with pytest.raises(InputError, match="Did you mean 'Europe/Berlin'"):
-        frames.to_utc(["2023-08-10 12:30"], "Europe/Brelin")
-
-
-@pytest.mark.parametrize("time", ["2023-10-29 02:30", "2023-03-26 02:30"])
-def test_a_wall_clock_time_that_daylight_saving_doubles_or_skips_is_refused(time):
-    with pytest.raises(InputError, match="daylight saving"):
-        frames.to_utc([time], "Europe/Berlin")
-
-
-def test_text_that_is_no_time_is_refused():
-    with pytest.raises(InputError, match="no time"):
-        frames.to_utc(["noon"], "UTC")

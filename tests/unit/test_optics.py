@@ -2,12 +2,13 @@ import numpy as np
 import pytest
 
 from dapple.errors import InputError
-from dapple.optics import surface_spectra
+from dapple.optics import spectrum_table, surface_spectra
 from dapple.optics.bands import band_edges, band_mean, band_width, par_bands, photon_flux
 from dapple.optics.leaf import leaf_spectra
 from dapple.scene import scene_optics
 
 BANDS = par_bands()
+PAR = (400.0, 700.0)
 
 
 def test_bands_cover_the_par_range_without_gap_or_overlap():
@@ -93,12 +94,96 @@ def test_an_impossible_surface_is_refused(wavelengths, values, message):
         surface_spectra.reflectance({"wavelength_nm": wavelengths, "reflectance": values}, BANDS)
 
 
+def spectrum(tmp_path, rows, header="wavelength_nm,reflectance"):
+    path = tmp_path / "spectrum.csv"
+    path.write_text(header + "\n" + "\n".join(rows) + "\n")
+    return path
+
+
+def steady(value, low=350, high=2500, step=1):
+    return [f"{nm},{value}" for nm in range(low, high + 1, step)]
+
+
 def test_a_spectrum_file_that_is_missing_or_foreign_is_refused(tmp_path):
     with pytest.raises(InputError, match="no file"):
-        surface_spectra.read(tmp_path / "none.csv")
-    (tmp_path / "foreign.csv").write_text("nm,r\n400,0.1\n")
-    with pytest.raises(InputError, match="columns nm, r; expected `wavelength_nm`"):
-        surface_spectra.read(tmp_path / "foreign.csv")
+        spectrum_table.read(tmp_path / "none.csv", PAR)
+    path = spectrum(tmp_path, ["400,0.1"], "when,what")
+    with pytest.raises(InputError, match=r"columns when, what.*`optics.wavelength_column`"):
+        spectrum_table.read(path, PAR)
+
+
+@pytest.mark.parametrize(
+    ("rows", "header"),
+    [
+        (steady(0.2), "wavelength_nm,reflectance"),
+        (steady(20), "wavelength [nm],reflectance [%]"),
+        (steady("20 %"), "wavelength,reflectance"),
+        ([row.replace(",", " nm,") for row in steady(0.2)], "wavelength,reflectance"),
+        ([f"{nm / 1000},0.2" for nm in range(350, 2501)], "wavelength_um,reflectance"),
+        ([f"{nm};0,2" for nm in range(350, 2501)], "Wavelength;Reflectance"),
+    ],
+)
+def test_units_of_a_spectrum_are_read_from_header_and_cells(tmp_path, rows, header):
+    read = spectrum_table.read(spectrum(tmp_path, rows, header), PAR)
+    assert read.wavelength_nm[[0, -1]] == pytest.approx([350, 2500])
+    assert read.values["reflectance"] == pytest.approx(0.2)
+    assert not read.findings
+
+
+def test_percent_without_a_word_is_recognised_and_said(tmp_path):
+    read = spectrum_table.read(spectrum(tmp_path, steady(20)), PAR)
+    assert read.values["reflectance"] == pytest.approx(0.2)
+    assert "Taken as percent" in read.findings[0].remedy
+
+
+def test_noise_outside_the_used_range_is_named_and_not_refused(tmp_path):
+    rows = [row if not 1800 <= int(row[:4].strip(",")) <= 1950 else f"{row[:4]},-0.3"
+            for row in steady(0.2)]  # fmt: skip
+    read = spectrum_table.read(spectrum(tmp_path, rows), PAR)
+    (found,) = read.findings
+    assert found.level == "note"
+    assert "between 1800 and 1950 nm, which is not used" in found.found
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        (steady(0.2, low=450), "450 to 2500 nm; expected 400 to 700 nm"),
+        ([*steady(0.2), "500,0.3"], "500 nm twice"),
+        (steady(-0.5), "reflectance -0.5 at 400 nm"),
+        ([f"{nm / 1000},0.2" for nm in range(350, 900)], "wavelength_um"),
+    ],
+)
+def test_a_spectrum_that_cannot_be_used_is_refused(tmp_path, rows, message):
+    with pytest.raises(InputError, match=message):
+        spectrum_table.read(spectrum(tmp_path, rows), PAR)
+
+
+def test_a_little_noise_is_cut_and_a_gap_is_drawn_over_and_both_are_said(tmp_path):
+    rows = [row for row in steady(0.2) if not 500 < int(row.split(",")[0]) < 560]
+    rows[60] = "410,-0.004"
+    read = spectrum_table.read(spectrum(tmp_path, rows), PAR)
+    assert read.values["reflectance"].min() == 0.0
+    said = " ".join(map(str, read.findings))
+    assert "a little outside 0 to 1" in said
+    assert "no value between 500 and 560 nm" in said
+
+
+def test_a_measured_leaf_takes_the_place_of_prospect(tmp_path):
+    rows = [f"{nm},0.1,{0.05 if nm < 500 else 0.15}" for nm in range(400, 701)]
+    path = spectrum(tmp_path, rows, "wavelength_nm,front_reflectance,transmittance")
+    optics = scene_optics.from_spectra(leaf={"path": path, "chlorophyll_ug_cm2": 45.0})
+    assert optics.reflectance["leaf"] == pytest.approx(0.1)
+    assert optics.transmittance["leaf"][[0, -1]] == pytest.approx([0.05, 0.15])
+
+
+def test_a_measured_leaf_gives_back_no_more_light_than_it_gets(tmp_path):
+    rows = [f"{nm},0.6,0.5" for nm in range(400, 701)]
+    path = spectrum(tmp_path, rows, "wavelength_nm,reflectance,transmittance")
+    with pytest.raises(InputError, match=r"reflectance 0\.6 and transmittance 0\.5 at 400 nm"):
+        scene_optics.from_spectra(leaf={"path": path})
+    with pytest.raises(InputError, match=r"`optics.leaf.transmittance_column`"):
+        scene_optics.from_spectra(leaf={"path": spectrum(tmp_path, steady(0.2))})
 
 
 def test_the_optics_of_a_scene_have_one_value_per_band_and_kind():

@@ -46,8 +46,8 @@ def test_a_plain_table_is_read_as_well_and_labels_stay_text(tmp_path):
     ("text", "message"),
     [
         ("label,X,Y,Z\n1_1,1,2,3\n1_1,2,2,3\n", "sensor 1_1 more than once"),
-        ("label,X,Y,Z\n1_1,1,,3\n", r"sensor 1_1 at \(1, nan, 3\)"),
-        ("label,X,Y,Z\n1_1,1,east,3\n", "expected three numbers"),
+        ("label,X,Y,Z\n1_1,1,,3\n", r"sensor 1_1 at \(1, , 3\)"),
+        ("label,X,Y,Z\n1_1,1,east,3\n", "line 2: found 'east'"),
         ("label,X,Y,Z\n1_1,1,inf,3\n", "expected three numbers"),
         ("label,X,Y,Z\n,1,2,3\n", "without a label"),
         ("label,X,Y\n1_1,1,2\n", "a column z_m or z"),

@@ -40,7 +40,7 @@ SETUP = Setup(
         "step_min": 40.0,
         "timezone": "UTC",
     },
-    radiation={"kind": "clear_sky"},
+    radiation={"linke_turbidity": 3.0},
     atmosphere={"model": "perez"},
 )
 

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from dapple import findings
 from dapple.figures import report
 from dapple.verdict import fitting, judgement
 from dapple.verdict.departure import MOST, suspicion
@@ -238,3 +239,14 @@ def test_the_page_opens_with_the_verdict_its_reasons_and_remedies(tmp_path, mode
     assert "some &lt;tree&gt;" in written
     (tmp_path / "verdict.json").unlink()
     assert "Verdict" not in report.build("x", tmp_path)
+
+
+def test_the_page_tells_what_was_noticed_about_the_input_the_worst_first(tmp_path):
+    (tmp_path / "sky").mkdir()
+    noticed = [findings.note("a.csv", "3 rows twice"), findings.warning("a.csv", "a <gap>")]
+    facts = {"modelled_share_of_day": 0.25, "findings": findings.rows(noticed)}
+    (tmp_path / "sky/radiation.json").write_text(json.dumps(facts))
+    written = report.build("x", tmp_path)
+    assert written.index("a &lt;gap&gt;") < written.index("3 rows twice")
+    assert "at 25 % of the times with the sun up" in written
+    assert "noticed" not in report.build("x", tmp_path / "empty")

@@ -169,14 +169,7 @@ LEAF = Mesh(
     np.array([[0, 1, 2]], np.int32),
     np.zeros(1, np.int32),
 )
-SENSORS = {
-    "kind": "table",
-    "columns": 1,
-    "rows": 1,
-    "spacing_m": 1.0,
-    "height_m": 0.1,
-    "ground_z_m": 0.0,
-}
+SENSORS = {"kind": "table", "table": {}, "grid": {}, "ground_z_m": 0.0}
 
 
 @pytest.mark.parametrize(

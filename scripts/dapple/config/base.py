@@ -62,3 +62,24 @@ class Section(BaseModel):
     """A group of parameters; keys that are not parameters are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+
+
+class TimedTable(Section):
+    """How a user's table tells time, numbers and what is missing."""
+
+    path: str = key("", "text table, relative to data_dir")
+    time_column: str = key("", "column of time stamps; empty: by its usual name")
+    timezone: str = key(
+        "", "zone of stamps without an offset: IANA name or +02:00; empty: as the file says"
+    )
+    time_format: str = key(
+        "", "how stamps are written, as %d.%m.%Y %H:%M, `epoch` or `excel`; empty: as they show"
+    )
+    interval_label: Literal["", "instant", "start", "middle", "end"] = key(
+        "", "what of its interval a stamp marks; empty: as the layout says, else a moment"
+    )
+    interval_min: NotNegative = key(0.0, "length of the intervals; 0: the step between rows")
+    decimal: Literal["", ".", ","] = key("", "decimal sign; empty: as the cells show")
+    missing: tuple[str | float, ...] = key(
+        (), "flags of missing values, besides empty, NAN, -999, 9999 and the like"
+    )

@@ -187,8 +187,9 @@ def light(settings: Settings, where: str) -> None:
 
 def times(settings: Settings, where: str) -> None:
     """There are times, and zones to read them in."""
-    for section in ("site", "time", "radiation"):
-        find_timezone(getattr(settings, section).timezone, f"{where}, `{section}.timezone`")
+    for section in ("site", "time", "radiation", "measured"):
+        if zone := getattr(settings, section).timezone:
+            find_timezone(zone, f"{where}, `{section}.timezone`")
     clock.time_range(**dict(settings.time), where=f"{where}, `time`")
 
 

@@ -2,23 +2,40 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Gt, Le
 
-from dapple.config.base import Positive, Section, Share, key
+from dapple.config.base import Positive, Share, TimedTable, key
+
+ATMOSPHERE = {
+    "precipitable_water_cm",
+    "ozone_atm_cm",
+    "aerosol_optical_depth_500nm",
+    "ground_albedo",
+}
 
 
-class Radiation(Section):
+class Radiation(TimedTable):
     """Broadband radiation that reaches the top of the tree."""
 
     kind: Literal["clear_sky", "table"] = key("clear_sky", "modelled, or read from a file")
-    path: str = key("", "CSV, relative to data_dir")
-    time_column: str = key("time_utc", "column of time stamps")
-    global_column: str = key("global_W_m2", "column of global horizontal irradiance [W m⁻²]")
-    diffuse_column: str = key("diffuse_W_m2", "column of diffuse horizontal irradiance [W m⁻²]")
-    timezone: str = key("UTC", "IANA zone of the time stamps")
-    max_gap_min: Positive = key(60.0, "rows of the file further apart are filled by the model")
+    global_column: str = key(
+        "", "column of global radiation on the horizontal; empty: by its usual name"
+    )
+    diffuse_column: str = key(
+        "", "column of diffuse radiation on the horizontal; empty: by its usual name, or none"
+    )
+    unit: Literal[
+        "", "W/m2", "kW/m2", "mW/cm2", "J/m2", "kJ/m2", "MJ/m2", "J/cm2", "Wh/m2", "kWh/m2"
+    ] = key("", "of both columns, sums over the interval; empty: as the header says, else W/m2")
+    diffuse_model: Literal["erbs", "dirint"] = key(
+        "erbs", "splits global radiation where diffuse is unknown", "Erbs et al. 1982"
+    )
+    implausible: Literal["refuse", "report"] = key(
+        "refuse", "what to do with a table that physics contradicts"
+    )
+    max_gap_min: Positive = key(60.0, "samples further apart are filled by the model")
     linke_turbidity: Positive = key(3.0, "haze of the clear-sky model", "Ineichen and Perez 2002")
     precipitable_water_cm: Annotated[float, Gt(0), Le(8)] = key(
         2.0, "water vapour, for the spectrum"
@@ -29,3 +46,11 @@ class Radiation(Section):
     sky: Literal["perez", "isotropic"] = key(
         "perez", "angular distribution of diffuse light", "Perez et al. 1993"
     )
+
+    def broadband(self) -> dict[str, Any]:
+        """Options of `sky.radiation_series.broadband`, without the path."""
+        return self.model_dump(exclude={"path", "sky", *ATMOSPHERE})
+
+    def atmosphere(self) -> dict[str, Any]:
+        """Options of `sky.sky_radiance.sky_dataset`."""
+        return {"model": self.sky} | self.model_dump(include=ATMOSPHERE)

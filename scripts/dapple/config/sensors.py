@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 from dapple.config.base import FREY, Count, NotNegative, Positive, Section, key
 
@@ -13,8 +13,23 @@ class Sensors(Section):
     kind: Literal["grid", "table", "none"] = key(
         "grid", "a grid around the stem, a file, or no light"
     )
-    path: str = key("", "CSV with label, X, Y, Z, relative to data_dir")
+    path: str = key("", "table of labels and world coordinates, relative to data_dir")
+    sensor_column: str = key("", "column of labels; empty: sensor or label")
+    x_column: str = key("", "column of east; empty: x_m, x, east or easting")
+    y_column: str = key("", "column of north; empty: y_m, y, north or northing")
+    z_column: str = key("", "column of height; empty: z_m, z or up")
+    decimal: Literal["", ".", ","] = key("", "decimal sign; empty: as the cells show")
     columns: Count = key(9, "grid: sensors from west to east")
     rows: Count = key(8, "grid: sensors from south to north")
     spacing_m: Positive = key(1.0, "grid: distance between neighbours", FREY)
     height_m: NotNegative = key(0.1, "grid: height above the ground")
+
+    def table(self) -> dict[str, Any]:
+        """Options of `scene.sensors.read`, without path and origin."""
+        return self.model_dump(
+            include={"sensor_column", "x_column", "y_column", "z_column", "decimal"}
+        )
+
+    def grid(self) -> dict[str, Any]:
+        """Options of `scene.sensors.grid_around`, without its centre."""
+        return self.model_dump(include={"columns", "rows", "spacing_m", "height_m"})

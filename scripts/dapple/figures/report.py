@@ -22,6 +22,8 @@ FIGURES = {
     "figures/advice.png": "What each refinement of the light changes.",
     "tradeoff/chart.png": "Accuracy against speed.",
 }
+NOTICED = ("sky/radiation.json", "sky/optics.json", "sky/sensors.json", "statistics/records.json")
+LEVELS = ("error", "warning", "note")
 STATES = {
     "green": ("#2e7d32", "nothing speaks against this light"),
     "amber": ("#b26a00", "look at what follows before using this light"),
@@ -54,7 +56,8 @@ def build(experiment: str, folder: Path) -> str:
     str
         HTML.
     """
-    parts = [f"<h1>{html.escape(experiment)}</h1>", _verdict(folder), _structure(folder)]
+    parts = [f"<h1>{html.escape(experiment)}</h1>", _verdict(folder), _noticed(folder)]
+    parts.append(_structure(folder))
     for name, title in TABLES.items():
         if (path := folder / name).is_file():
             parts += [f"<h2>{title}</h2>", _table(pd.read_csv(path))]
@@ -98,6 +101,27 @@ def _verdict(folder: Path) -> str:
     if not judged["with_records"]:
         parts.append("<p>Wrong sensor positions and clocks leave no trace in a scan.</p>")
     return "\n".join([*parts, "</section>"])
+
+
+def _noticed(folder: Path) -> str:
+    """What was noticed about the files that a run was given; nothing where nothing was."""
+    facts = [json.loads(path.read_text()) for name in NOTICED if (path := folder / name).is_file()]
+    rows = [one for table in facts for one in table.get("findings", ())]
+    rows.sort(key=lambda one: LEVELS.index(one["level"]))
+    share = next((t["modelled_share_of_day"] for t in facts if "modelled_share_of_day" in t), 0.0)
+    lines = []
+    for one in rows:
+        expected = f"; expected {one['expected']}" if one["expected"] else ""
+        text = f"{one['where']}: {one['found']}{expected}. {one['remedy']}"
+        lines.append(f"<li><b>{one['level']}</b> {html.escape(text)}</li>")
+    if share:
+        lines.append(
+            f"<li>Radiation is modelled, not measured, at {100 * share:.0f} % of the times with "
+            "the sun up.</li>"
+        )
+    if not lines:
+        return ""
+    return "\n".join(["<h2>What was noticed about the input</h2><ul>", *lines, "</ul>"])
 
 
 def _badge(state: str) -> str:

@@ -1,8 +1,12 @@
 """Leaf reflectance and transmittance from biochemistry, with PROSPECT."""
 
+from pathlib import Path
+
 import numpy as np
 
 from dapple.errors import InputError
+from dapple.findings import Finding
+from dapple.optics import spectrum_table
 from dapple.optics.bands import (
     CAMERA_HALF_WIDTH_NM,
     CAMERA_NM,
@@ -84,6 +88,41 @@ def leaf_spectra(
         band_mean(table_nm, reflectance, wavelength_nm),
         band_mean(table_nm, transmittance, wavelength_nm),
     )
+
+
+def measured_leaf(
+    path: str | Path,
+    wavelength_nm: np.ndarray,
+    *,
+    noticed: list[Finding] | None = None,
+    **columns: str,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Measured reflectance and transmittance of a leaf, averaged over each band.
+
+    Parameters
+    ----------
+    path : path
+        A table with both (see `spectrum_table.read`).
+    wavelength_nm : (b,) float
+        Band centres [nm].
+    noticed : list or None
+        What is noticed about the file is appended to it.
+    **columns
+        Names of its columns and its decimal sign.
+
+    Returns
+    -------
+    reflectance, transmittance : (b,) float64
+    """
+    used = (float(wavelength_nm[0]), float(wavelength_nm[-1]))
+    spectrum = spectrum_table.read(
+        path, used, with_transmittance=True, key="optics.leaf", **columns
+    )
+    if noticed is not None:
+        noticed.extend(spectrum.findings)
+    both = (spectrum.values[kind] for kind in ("reflectance", "transmittance"))
+    reflected, passed = (band_mean(spectrum.wavelength_nm, one, wavelength_nm) for one in both)
+    return reflected, passed
 
 
 def camera_leaves(

@@ -1,12 +1,14 @@
 """Reflectance of bark and ground: one value, a table, or a file."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from dapple.errors import InputError
+from dapple.findings import Finding
+from dapple.optics import spectrum_table
 from dapple.optics.bands import band_mean
 
 # Assumed, not measured: between measured branches of birch and larch (0.07 to 0.18, spectral
@@ -20,57 +22,31 @@ MEADOW = {
     "reflectance": (0.03, 0.05, 0.10, 0.07, 0.05, 0.12),
 }
 
-Spectrum = float | str | Path | Mapping[str, Sequence[float] | str]
-
-
-def read(path: str | Path) -> pd.Series:
-    """Read a reflectance spectrum from CSV.
-
-    Parameters
-    ----------
-    path : path
-        Columns `wavelength_nm` and `reflectance`, or `front_reflectance` as in the tables
-        that LESS exports.
-
-    Returns
-    -------
-    pandas.Series
-        Reflectance by ascending wavelength [nm].
-
-    Raises
-    ------
-    InputError
-        No such file or columns.
-    """
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(path, "no file", "a CSV table of a spectrum", "Check the path.")
-    table = pd.read_csv(path)
-    names = [name for name in ("reflectance", "front_reflectance") if name in table]
-    if "wavelength_nm" not in table or not names:
-        raise InputError(
-            path,
-            f"columns {', '.join(map(str, table.columns))}",
-            "`wavelength_nm` and `reflectance` (or `front_reflectance`)",
-            "Rename the columns.",
-        )
-    return table.set_index("wavelength_nm")[names[0]].sort_index()
+Spectrum = float | str | Path | Mapping[str, object]
+COLUMNS = {"wavelength_column", "reflectance_column", "decimal"}
 
 
 def reflectance(
-    source: Spectrum, wavelength_nm: np.ndarray, *, where: str = "reflectance"
+    source: Spectrum,
+    wavelength_nm: np.ndarray,
+    *,
+    where: str = "reflectance",
+    noticed: list[Finding] | None = None,
 ) -> np.ndarray:
     """Reflectance per band from a number, a table or a file.
 
     Parameters
     ----------
     source : float, mapping or path
-        One value for all bands; a table with the keys `wavelength_nm` and `reflectance`,
-        linear between its entries; or a CSV file (see `read`), also as the key `path`.
+        One value for all bands; a mapping with the keys `wavelength_nm` and `reflectance`, linear
+        between its entries; or a file (see `spectrum_table.read`), also as the key `path` with the
+        names of its columns.
     wavelength_nm : (b,) float
         Band centres [nm].
     where : str
         The configuration key, for messages.
+    noticed : list or None
+        What is noticed about a file is appended to it.
 
     Returns
     -------
@@ -83,13 +59,15 @@ def reflectance(
         Values outside 0 to 1, not numbers, or a table that does not cover the bands.
     """
     if isinstance(source, Mapping) and source.get("path"):
-        source = source["path"]
+        columns = {key: str(value) for key, value in source.items() if key in COLUMNS}
+        return of_file(str(source["path"]), wavelength_nm, where, noticed, **columns)
     if isinstance(source, (str, Path)):
-        table, where = read(source), f"{where} ({source})"
-    elif isinstance(source, Mapping):
+        return of_file(source, wavelength_nm, where, noticed)
+    if isinstance(source, Mapping):
         table = _table(source, where)
     else:
-        table = pd.Series(float(source), index=[wavelength_nm[0] - 1.0, wavelength_nm[-1] + 1.0])
+        value = float(source)  # type: ignore[arg-type]
+        table = pd.Series(value, index=[wavelength_nm[0] - 1.0, wavelength_nm[-1] + 1.0])
     wrong = ~table.between(0.0, 1.0)
     if wrong.any():
         raise InputError(
@@ -109,8 +87,24 @@ def reflectance(
     return band_mean(table.index.to_numpy(float), table.to_numpy(float), wavelength_nm)
 
 
-def _table(source: Mapping[str, Sequence[float] | str], where: str) -> pd.Series:
-    wavelengths, values = source["wavelength_nm"], source["reflectance"]
+def of_file(
+    path: str | Path,
+    wavelength_nm: np.ndarray,
+    where: str,
+    noticed: list[Finding] | None = None,
+    **columns: str,
+) -> np.ndarray:
+    """Reflectance (b,) per band from a file; see `reflectance`."""
+    spectrum = spectrum_table.read(
+        path, (wavelength_nm[0], wavelength_nm[-1]), key=f"optics.{where.split()[0]}", **columns
+    )
+    if noticed is not None:
+        noticed.extend(spectrum.findings)
+    return band_mean(spectrum.wavelength_nm, spectrum.values["reflectance"], wavelength_nm)
+
+
+def _table(source: Mapping[str, object], where: str) -> pd.Series:
+    wavelengths, values = (list(source[key]) for key in ("wavelength_nm", "reflectance"))  # type: ignore[call-overload]
     if len(wavelengths) != len(values):
         raise InputError(
             where,

@@ -4,15 +4,26 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from dapple.errors import InputError
+from dapple.findings import Finding
 from dapple.formats import netcdf
 from dapple.optics.bands import par_bands
-from dapple.optics.leaf import leaf_spectra
+from dapple.optics.leaf import leaf_spectra, measured_leaf
 from dapple.optics.surface_spectra import BARK, MEADOW, Spectrum, reflectance
+
+LEAF_FILE = {
+    "path",
+    "wavelength_column",
+    "reflectance_column",
+    "transmittance_column",
+    "decimal",
+}
+"""Options of a leaf that belong to a measured spectrum."""
 
 
 @dataclass(frozen=True)
@@ -99,17 +110,21 @@ def from_spectra(
     bark: Spectrum = BARK,
     ground: Spectrum = MEADOW,
     wavelength_nm: np.ndarray | None = None,
+    noticed: list[Finding] | None = None,
 ) -> Optics:
     """Optical properties of leaves, wood and ground in every band.
 
     Parameters
     ----------
     leaf : mapping or None
-        Keyword arguments of `dapple.optics.leaf.leaf_spectra`; None: its defaults.
+        Keyword arguments of `dapple.optics.leaf.leaf_spectra`, or `path` and those of
+        `measured_leaf`; None: the defaults of the former.
     bark, ground : float, mapping or path
         See `reflectance`.
     wavelength_nm : (b,) float or None
         Band centres [nm]; None: 400 to 700 nm in steps of 5 nm.
+    noticed : list or None
+        What is noticed about files of spectra is appended to it.
 
     Returns
     -------
@@ -118,9 +133,21 @@ def from_spectra(
     wavelength = par_bands() if wavelength_nm is None else np.asarray(wavelength_nm, float)
     return Optics.of_tree(
         wavelength,
-        *leaf_spectra(wavelength, **(leaf or {})),
-        reflectance(bark, wavelength, where="bark reflectance"),
-        reflectance(ground, wavelength, where="ground reflectance"),
+        *_leaf(leaf or {}, wavelength, noticed),
+        reflectance(bark, wavelength, where="bark reflectance", noticed=noticed),
+        reflectance(ground, wavelength, where="ground reflectance", noticed=noticed),
+    )
+
+
+def _leaf(
+    options: Mapping[str, Any], wavelength_nm: np.ndarray, noticed: list[Finding] | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Reflectance and transmittance (b,) of leaves, measured or by PROSPECT."""
+    columns = {key: value for key, value in options.items() if key in LEAF_FILE}
+    if path := columns.pop("path", ""):
+        return measured_leaf(path, wavelength_nm, noticed=noticed, **columns)
+    return leaf_spectra(
+        wavelength_nm, **{key: value for key, value in options.items() if key not in LEAF_FILE}
     )
 
 

@@ -8,69 +8,88 @@ import pandas as pd
 from scipy.spatial import cKDTree
 
 from dapple.errors import InputError
+from dapple.formats import user_tables
 from dapple.formats.meshes import Mesh
 
 COLUMN_NAMES = {
     "sensor": ("sensor", "label"),
-    "x_m": ("x_m", "x"),
-    "y_m": ("y_m", "y"),
-    "z_m": ("z_m", "z"),
+    "x_m": ("x_m", "x", "east", "easting"),
+    "y_m": ("y_m", "y", "north", "northing"),
+    "z_m": ("z_m", "z", "up"),
 }
 POSITION = ["x_m", "y_m", "z_m"]
 
 
-def read(path: str | Path, origin_m: Sequence[float] = (0.0, 0.0, 0.0)) -> pd.DataFrame:
-    """Read sensor positions from CSV.
+def read(
+    path: str | Path,
+    origin_m: Sequence[float] = (0.0, 0.0, 0.0),
+    *,
+    sensor_column: str = "",
+    x_column: str = "",
+    y_column: str = "",
+    z_column: str = "",
+    decimal: str = "",
+) -> pd.DataFrame:
+    """Read sensor positions.
 
     Parameters
     ----------
     path : path
-        Columns `sensor` or `label`, and `x`, `y`, `z` (or `x_m` …) in world coordinates [m];
-        capitals do not matter, further columns are ignored.
+        A text table with columns of labels and of world coordinates [m], and perhaps `calibration`,
+        by which the records of a sensor are multiplied; further columns are ignored.
     origin_m : (3,) float
         World coordinates of the local origin [m].
+    sensor_column, x_column, y_column, z_column : str
+        Empty: found by the usual names, `COLUMN_NAMES`; capitals do not matter.
+    decimal : {"", ".", ","}
+        Decimal sign; empty: as the cells show.
 
     Returns
     -------
     pandas.DataFrame
-        `sensor` (text), `x_m`, `y_m`, `z_m` in the local frame [m], in the order of the file.
+        `sensor` (text), `x_m`, `y_m`, `z_m` in the local frame [m], in the order of the file; and
+        `calibration` where the file has it.
 
     Raises
     ------
     InputError
         No file, column or row; a label that is missing or repeated; a coordinate that is not a
-        number.
+        number; a calibration that is not positive.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(path, "no file", "a CSV table of sensors", "Check the path.")
-    raw = pd.read_csv(path, dtype=str)
-    found = {str(name).strip().lower(): name for name in raw.columns}
-    sensors = pd.DataFrame(index=raw.index)
-    for name, aliases in COLUMN_NAMES.items():
-        column = next((found[alias] for alias in aliases if alias in found), None)
-        if column is None:
-            raise InputError(
-                path,
-                f"columns {', '.join(map(str, raw.columns))}",
-                f"a column {' or '.join(aliases)}",
-                "Rename the column.",
-            )
-        sensors[name] = raw[column]
-    labels = sensors["sensor"].fillna("").str.strip()
+    source = user_tables.read(path, decimal=decimal)
+    asked = dict(zip(COLUMN_NAMES, (sensor_column, x_column, y_column, z_column), strict=True))
+    columns = {
+        name: source.require(
+            [asked[name]] if asked[name] else aliases, f"sensors.{name.removesuffix('_m')}_column"
+        )
+        for name, aliases in COLUMN_NAMES.items()
+    }
+    labels = source.text(columns["sensor"])
     _check_labels(labels, path)
-    numbers = sensors[POSITION].apply(pd.to_numeric, errors="coerce")
-    wrong = ~np.isfinite(numbers).all(axis=1)
+    numbers = pd.DataFrame({name: source.numbers(columns[name]).values for name in POSITION})
+    wrong = ~np.isfinite(numbers).all(axis=1).to_numpy()
     if wrong.any():
-        first = sensors.loc[wrong].iloc[0]
+        first = source.cells[wrong].iloc[0]
+        where = ", ".join(first[columns[name]] for name in POSITION)
         raise InputError(
             path,
-            f"sensor {first['sensor']} at ({first['x_m']}, {first['y_m']}, {first['z_m']})",
+            f"sensor {first[columns['sensor']]} at ({where})",
             "three numbers",
             "Complete its coordinates or remove the sensor.",
         )
-    local = numbers - np.asarray(origin_m, float)
-    return local.assign(sensor=labels)[["sensor", *POSITION]].reset_index(drop=True)
+    table = numbers - np.asarray(origin_m, float)
+    table.insert(0, "sensor", labels.to_numpy())
+    if column := source.find(["calibration", "calibration_factor"]):
+        factor = source.numbers(column).values
+        if not (factor > 0).all():
+            raise InputError(
+                path,
+                f"calibration {source.text(column)[~(factor > 0)].iloc[0]!r}",
+                "a factor above 0 in every row",
+                "Write 1 where records need none.",
+            )
+        table["calibration"] = factor
+    return table
 
 
 def grid_around(

@@ -16,10 +16,10 @@ from dapple.light.series import Light
 from dapple.stability.chain import SHIFT_M, Chain, f1_of, true_conditions
 from dapple.stability.reconstructions import METHODS, size_of
 from dapple.stability.stressors import Conditions, Level, Stressor
-from dapple.stats import measured
 from dapple.streams import stream_seed
 from dapple.verdict import signals
 from dapple.verdict.inputs import Evidence, count_points, no_mesh
+from dapple.virtual.sensor_model import simulate
 
 COLUMNS = [
     "stressor",
@@ -156,7 +156,7 @@ def evidence(
     meshes = meshes if has_polygons else {"leaf": no_mesh(), "wood": no_mesh()}
     true_sky = chain.sky(true_conditions(conditions))[0]
     sky, places_m = chain.sky(conditions)[0], chain.sensors_m(conditions)
-    records = measured.simulate(_dataset(truth, true_sky), seed=stream_seed(chain.seed, "records"))
+    records = simulate(_dataset(truth, true_sky), seed=stream_seed(chain.seed, "records"))
     records["time"] = records["time"].dt.tz_localize(None)  # as in datasets
     records = records.set_index(["sensor", "time"])["par_umol_m2_s"].to_xarray()
     voxels = {

@@ -14,7 +14,7 @@ from dapple.formats.meshes import Mesh, concatenate
 from dapple.formats.shots import Shots
 from dapple.scene import sensors
 from dapple.sky.sky_radiance import sky_dataset
-from dapple.sky.sun import Site, broadband, position
+from dapple.sky.sun import Site, clear_sky, position
 from dapple.stability.stressors import Conditions
 from dapple.streams import stream_seed
 from dapple.times import time_range
@@ -359,7 +359,7 @@ def sky(setup: Setup, conditions: Conditions, offset_min: float = 0.0) -> xr.Dat
     """Sun and sky at the times of the series, for a clock that is `offset_min` ahead."""
     when = times(setup, conditions) + pd.Timedelta(minutes=offset_min)
     place = Site(**setup.site)
-    radiation = broadband(when, place, **setup.radiation)
+    radiation = clear_sky(when, place, **setup.radiation)
     if (share := conditions.diffuse_share) is not None:
         total = radiation["global_w_m2"] * (1 - (1 - OVERCAST_SHARE) * share)
         radiation = radiation.assign(global_w_m2=total, diffuse_w_m2=share * total)

@@ -1,80 +1,323 @@
-"""Measured PAR series, from loggers or from a sensor model in a virtual world."""
+"""Measured PAR series of loggers: what the table says, in µmol m⁻² s⁻¹, UTC and sensor labels."""
 
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import xarray as xr
 
+from dapple import findings, timezones
 from dapple.errors import InputError
-from dapple.formats.netcdf import times as times_of
-from dapple.streams import stream_seed
-from dapple.times import parse
+from dapple.findings import Finding
+from dapple.formats import units, user_tables
+from dapple.formats.user_tables import LIGHT_FLAGS, TIME_NAMES, Table
+from dapple.times import AHEAD, parse
 
 MIN_PAR_UMOL_M2_S = -20.0  # offsets of a sensor in the dark
 MAX_PAR_UMOL_M2_S = 4000.0  # the sun outside the atmosphere gives about 2700
 COLUMNS = ["sensor", "time", "par_umol_m2_s"]
+INTERVAL = "interval_s"
+PAR_NAMES = ("par_umolm2s", "par_umol_m2_s", "par", "ppfd", "ppfd_in")
+SENSOR_NAMES = ("sensor", "label")
+
+
+@dataclass(frozen=True)
+class Records:
+    """Records of many sensors.
+
+    Attributes
+    ----------
+    table : pandas.DataFrame
+        `sensor` (text), `time` (UTC, the middle of the record's interval), `par_umol_m2_s`,
+        `interval_s` (over which it is a mean; 0: a sample of the moment), by sensor as they first
+        appear and by time.
+    findings : tuple of Finding
+    facts : dict
+        What was read, and what was left out.
+    """
+
+    table: pd.DataFrame
+    findings: tuple[Finding, ...] = ()
+    facts: dict = field(default_factory=dict)
 
 
 def read(
-    path: str | Path,
+    path: str | Path | Sequence[str | Path],
     *,
-    time_column: str = "time_utc",
-    par_column: str = "par_umolm2s",
-    timezone: str | None = None,
     sensors: pd.DataFrame | None = None,
-) -> pd.DataFrame:
-    """Read PAR records from CSV.
+    time_column: str = "",
+    sensor_column: str = "",
+    par_column: str = "",
+    timezone: str = "",
+    time_format: str = "",
+    interval_label: str = "",
+    interval_min: float = 0.0,
+    unit: str = "",
+    decimal: str = "",
+    missing: Sequence[str | float] = (),
+) -> Records:
+    """Read PAR records.
 
     Parameters
     ----------
-    path : path
-        Besides the columns below either `sensor` or `logger` and `channel`, which together make
-        the label `logger_channel`.
-    time_column, par_column : str
-        Times (see `times.parse`) and photon flux [µmol m⁻² s⁻¹].
-    timezone : str or None
-        IANA zone of times without an offset; a column that ends in `_utc` needs none.
+    path : path or several
+        Text tables in any layout of `dapple.formats.user_tables`: long ones with a column of
+        labels (`sensor`, or `logger` and `channel`, which together make the label
+        `logger_channel`), wide ones with a column for each sensor, or a file for each sensor.
     sensors : pandas.DataFrame or None
-        The sensor table, where every recorded sensor must be found.
-
-    Returns
-    -------
-    pandas.DataFrame
-        `sensor` (text), `time` (UTC), `par_umol_m2_s`, by sensor as they first appear and by
-        time. Rows without a value are left out, exact repetitions are read once.
+        The sensor table. Every recorded sensor must be in it, columns and files of wide tables are
+        known by its labels, and its column `calibration`, where there is one, multiplies records.
+    time_column, sensor_column, par_column : str
+        Empty: found by the usual names or the file's layout. `par_column` of a wide table is a
+        pattern such as `PAR_{sensor}_Avg`.
+    timezone, time_format : str
+        See `times.parse`.
+    interval_label : {"", "instant", "start", "middle", "end"}
+        What of its interval a stamp marks; empty: what the layout says, else a moment.
+    interval_min : float
+        Length of the intervals [min]; 0: the step between a sensor's records.
+    unit : str
+        Of the values (`units.PHOTONS`, `units.PHOTON_SUMS`); empty: as the header says, else
+        umol/m2/s.
+    decimal, missing
+        See `radiation_table.read`.
 
     Raises
     ------
     InputError
-        No file or column, unreadable or naive times, two values for one sensor and time,
-        impossible values, or sensors that the table does not know.
+        No file or column, unreadable or naive times, text that is no number, two values for one
+        sensor and time, impossible values, or sensors that the table does not know.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(path, "no file", "a CSV table of PAR records", "Check the path.")
-    raw = pd.read_csv(path, dtype={"sensor": str, "logger": str, "channel": str})
-    labels = {"sensor"} if "sensor" in raw else {"logger", "channel"}
-    if missing := sorted({time_column, par_column, *labels} - set(raw.columns)):
-        raise InputError(
-            path,
-            f"columns {', '.join(map(str, raw.columns))}",
-            f"columns {', '.join(missing)}",
-            "Name the columns in the configuration.",
+    paths = [path] if isinstance(path, str | Path) else list(path)
+    files = [
+        _read_file(
+            Path(one),
+            sensors,
+            columns=(time_column, sensor_column, par_column),
+            zone=timezone,
+            time_format=time_format,
+            interval=(interval_label, interval_min),
+            unit=unit,
+            decimal=decimal,
+            missing=missing,
         )
-    label = raw["sensor"] if "sensor" in raw else raw["logger"] + "_" + raw["channel"]
-    records = pd.DataFrame(
-        {
-            "sensor": label.str.strip(),
-            "time": parse(raw[time_column], path, timezone),
-            "par_umol_m2_s": pd.to_numeric(raw[par_column], errors="coerce"),
-        }
-    )
-    records = records.dropna().drop_duplicates(ignore_index=True)
-    _check_records(records, path)
+        for one in paths
+    ]
+    noticed = [found for one in files for found in one.findings]
+    records = pd.concat([one.table for one in files], ignore_index=True)
+    records = records.dropna(subset="par_umol_m2_s")
+    where = paths[0] if len(paths) == 1 else f"{paths[0]} and {len(paths) - 1} more"
+    if repeated := int(records.duplicated(COLUMNS).sum()):
+        noticed.append(findings.note(where, f"{repeated} records twice, each read once"))
+    records = records.drop_duplicates(COLUMNS)
+    _check(records, where)
     if sensors is not None:
-        check_sensors(records, sensors, path)
-    return _sorted(records)
+        check_sensors(records, sensors, where)
+        if "calibration" in sensors:
+            factor = sensors.set_index("sensor")["calibration"]
+            records["par_umol_m2_s"] *= records["sensor"].map(factor)
+    facts = {
+        "files": [one.facts for one in files],
+        "records": len(records),
+        "sensors": int(records["sensor"].nunique()),
+        "repeated": repeated,
+    }
+    return Records(_with_intervals(_sorted(records)), tuple(noticed), facts)
+
+
+def _read_file(
+    path: Path,
+    sensors: pd.DataFrame | None,
+    *,
+    columns: tuple[str, str, str],
+    zone: str,
+    time_format: str,
+    interval: tuple[str, float],
+    unit: str,
+    decimal: str,
+    missing: Sequence[str | float],
+) -> Records:
+    """One file: a row a record, missing ones NaN, with `label` and `length_min` of its interval."""
+    time_column, sensor_column, par_column = columns
+    source = user_tables.read(path, decimal=decimal)
+    zone = zone or source.timezone or ""
+    long, numbers = _long(source, sensors, sensor_column, par_column, missing)
+    if time_column:
+        time_column = source.require([time_column], "measured.time_column")
+    else:
+        time_column = source.known.get("time") or source.require(TIME_NAMES, "measured.time_column")
+    stamps = parse(
+        source.text(time_column), path, zone, time_format=time_format, group=_groups(long, source)
+    )
+    long["time"] = pd.Series(stamps, index=source.cells.index).loc[long["line"]].to_numpy()
+    noticed = _in_micromoles(long, source, numbers, unit, interval[1])
+    label = interval[0] or source.interval_label or "instant"
+    long = long.assign(label=label, length_min=interval[1] or source.interval_min or 0.0)
+    flags = {name: one.missing for name, one in numbers.items() if one.missing}
+    noticed += [
+        findings.note(path, f"{sum(counts.values())} values of {name} missing "
+                            f"({user_tables.counted(counts)})")
+        for name, counts in flags.items()
+    ]  # fmt: skip
+    if text := timezones.note(zone):
+        noticed.append(findings.warning(path, f"the time zone {text}"))
+    facts = {
+        "path": str(path),
+        "layout": source.layout,
+        "timezone": zone or "in the file",
+        "columns": [time_column, *numbers],
+        "interval_label": label,
+        "missing": flags,
+        "rows": len(long),
+    }
+    return Records(long, tuple(noticed), facts)
+
+
+def _long(
+    source: Table,
+    sensors: pd.DataFrame | None,
+    sensor_column: str,
+    par_column: str,
+    missing: Sequence[str | float],
+) -> tuple[pd.DataFrame, dict[str, user_tables.Numbers]]:
+    """One row a record: `line`, `sensor`, `column`, `par_umol_m2_s`; and the columns read."""
+    flags = (*LIGHT_FLAGS, *missing)
+    sensor = sensor_column and source.require([sensor_column], "measured.sensor_column")
+    sensor = sensor or source.find(SENSOR_NAMES)
+    logger, channel = source.find(["logger"]), source.find(["channel"])
+    if sensor or (logger and channel):
+        names = [par_column] if par_column else [*PAR_NAMES]
+        column = source.known.get("par") if not par_column else None
+        column = column or source.require(names, "measured.par_column")
+        labels = source.text(sensor) if sensor else _joined(source, logger, channel)
+        numbers = source.numbers(column, flags)
+        rows = {"line": source.cells.index, "sensor": labels.to_numpy(), "column": column}
+        return pd.DataFrame(rows | {"par_umol_m2_s": numbers.values}), {column: numbers}
+    found = _columns_of_sensors(source, sensors, par_column)
+    read_columns = {column: source.numbers(column, flags) for column in found.values()}
+    parts = [
+        pd.DataFrame({"line": source.cells.index, "sensor": label, "column": column,
+                      "par_umol_m2_s": read_columns[column].values})
+        for label, column in found.items()
+    ]  # fmt: skip
+    return pd.concat(parts, ignore_index=True), read_columns
+
+
+def _joined(source: Table, logger: str | None, channel: str | None) -> pd.Series:
+    return source.text(str(logger)) + "_" + source.text(str(channel))
+
+
+def _groups(long: pd.DataFrame, source: Table) -> pd.Series | None:
+    """To which series a line belongs; None where a line holds all sensors."""
+    if long["line"].duplicated().any():
+        return None
+    return pd.Series(long["sensor"].to_numpy(), index=source.cells.index)
+
+
+def _columns_of_sensors(
+    source: Table, sensors: pd.DataFrame | None, pattern: str
+) -> dict[str, str]:
+    """Label to column of a wide table, or of a file that holds one sensor.
+
+    Raises
+    ------
+    InputError
+        No column belongs to a sensor, or several to one.
+    """
+    columns = [name for name in source.cells if name not in source.known.values()]
+    labels = [] if sensors is None else list(sensors["sensor"])
+    if "{sensor}" in pattern:
+        found = {label: [name for name in columns if name == pattern.format(sensor=label)]
+                 for label in labels}  # fmt: skip
+    else:
+        columns = [source.require([pattern], "measured.par_column")] if pattern else columns
+        found = {label: [name for name in columns if _is_of(name, label)] for label in labels}
+    found = {label: names for label, names in found.items() if names}
+    for label, names in found.items():
+        if len(names) > 1:
+            raise InputError(
+                source.path,
+                f"columns {' and '.join(names)} for sensor {label}",
+                "one column of PAR for each sensor",
+                "Set `measured.par_column` to a pattern such as 'PAR_{sensor}_Avg'.",
+            )
+    if found:
+        return {label: names[0] for label, names in found.items()}
+    quantity = pattern or next((n for n in columns if _is_par(source, n)), "")
+    named = [label for label in labels if _is_of(source.path.stem, label)]
+    if quantity and (len(named) == 1 or len(labels) == 1):
+        return {(named or labels)[0]: quantity}
+    raise InputError(
+        source.path,
+        f"columns {', '.join(source.cells.columns)}",
+        "a column `sensor`, or `logger` and `channel`; or columns named after the sensors"
+        + (f", such as {labels[0]}" if labels else ""),
+        "Name the columns in `measured.sensor_column` and `measured.par_column`; the latter may be "
+        "a pattern such as 'PAR_{sensor}_Avg'.",
+    )
+
+
+def _is_par(source: Table, column: str) -> bool:
+    unit = units.named(source.units.get(column, "")) or units.named(column)
+    return unit in units.PHOTONS or column.lower() in PAR_NAMES
+
+
+def _is_of(name: str, label: str) -> bool:
+    """Whether a column's or file's name holds a label as whole words: PAR_3_7_Avg holds 3_7."""
+    words, wanted = (re.findall(r"[^\W_]+", text.lower()) for text in (name, label))
+    return any(
+        words[k : k + len(wanted)] == wanted for k in range(len(words) - len(wanted) + 1)
+    ) and bool(wanted)
+
+
+def _in_micromoles(
+    long: pd.DataFrame,
+    source: Table,
+    columns: dict[str, user_tables.Numbers],
+    declared: str,
+    interval_min: float,
+) -> list[Finding]:
+    """Convert records in place to µmol m⁻² s⁻¹, and say what is doubtful of their unit."""
+    noticed: list[Finding] = []
+    for column, numbers in columns.items():
+        where = f"{source.path}, column {column!r}"
+        unit, doubt = units.of_column(
+            numbers.unit, column, declared, where=where, key="measured.unit",
+            known=units.PHOTON_FLUXES,
+        )  # fmt: skip
+        noticed += doubt
+        if unit == "W/m2":
+            noticed.append(
+                findings.warning(where, "PAR in W m⁻²", "µmol m⁻² s⁻¹",
+                                 f"Taken as {units.SUNLIGHT_UMOL_PER_J} µmol J⁻¹, which holds for "
+                                 "sunlight.")
+            )  # fmt: skip
+        length = interval_min or source.interval_min
+        long.loc[long["column"] == column, "par_umol_m2_s"] *= units.photon_factor(
+            unit or "umol/m2/s", length, where
+        )
+    return noticed
+
+
+def _with_intervals(records: pd.DataFrame) -> pd.DataFrame:
+    """Stamps moved to the middle of their intervals, whose length is known or the usual step."""
+    step_min = records.groupby("sensor", sort=False)["time"].transform(
+        lambda times: (
+            np.median(np.diff(times.to_numpy()).astype("timedelta64[ns]").astype(float)) / 60e9
+            if len(times) > 1
+            else 0.0
+        )
+    )
+    length_min = records["length_min"].where(records["length_min"] > 0, step_min).astype(float)
+    length_min = length_min.where(records["label"] != "instant", 0.0)
+    shift_min = records["label"].map(AHEAD) * length_min
+    moved = records["time"] + pd.to_timedelta(shift_min, unit="min")
+    result = records[["sensor"]].assign(time=moved.astype("datetime64[ns, UTC]"))
+    result["par_umol_m2_s"] = records["par_umol_m2_s"]
+    result[INTERVAL] = 60.0 * length_min
+    return result.reset_index(drop=True)
 
 
 def check_sensors(
@@ -99,94 +342,24 @@ def check_sensors(
         )
 
 
-def coverage(records: pd.DataFrame) -> pd.DataFrame:
-    """What each sensor's series covers.
-
-    Returns
-    -------
-    pandas.DataFrame
-        `sensor, n, first, last, step_s, missing, longest_gap_s`: the step is the median time
-        between records, and `missing` the number of records that it leaves out.
-    """
-    rows = []
-    for sensor, series in records.groupby("sensor", sort=False):
-        time = series["time"].sort_values()
-        gaps_s = time.diff().dropna().dt.total_seconds().to_numpy()
-        step_s = float(np.median(gaps_s)) if len(gaps_s) else np.nan
-        missing = int((np.round(gaps_s / step_s) - 1).clip(min=0).sum()) if len(gaps_s) else 0
-        longest_s = float(gaps_s.max()) if len(gaps_s) else 0.0
-        first, last = time.iloc[0], time.iloc[-1]
-        rows.append((sensor, len(series), first, last, step_s, missing, longest_s))
-    names = ["sensor", "n", "first", "last", "step_s", "missing", "longest_gap_s"]
-    return pd.DataFrame(rows, columns=names)
-
-
-def simulate(
-    light: xr.Dataset,
-    *,
-    noise_relative: float = 0.02,
-    noise_umol_m2_s: float = 2.0,
-    calibration_relative: float = 0.0,
-    clock_offset_s: float = 0.0,
-    seed: int,
-) -> pd.DataFrame:
-    """Records that sensors would make in a virtual world.
-
-    Parameters
-    ----------
-    light : xarray.Dataset
-        `par_umol_m2_s` (sensor, time): the true light.
-    noise_relative, noise_umol_m2_s : float
-        Standard deviation of a record: share of the light, and constant [µmol m⁻² s⁻¹].
-    calibration_relative : float
-        Standard deviation of the factor by which a whole sensor errs.
-    clock_offset_s : float
-        How far the loggers' clock is ahead [s]: a record stamped t saw the light of t minus
-        this, linear between the times of `light`.
-    seed : int
-        Each sensor has its own stream, named after its label.
-
-    Returns
-    -------
-    pandas.DataFrame
-        `sensor`, `time` (UTC), `par_umol_m2_s` ≥ 0 at the times of `light`; stamps whose light
-        lies outside the series are left out.
-    """
-    times = times_of(light)
-    stamps_s = (times - times[0]).total_seconds().to_numpy() if len(times) else np.zeros(0)
-    seen_s = stamps_s - clock_offset_s
-    kept = (seen_s >= stamps_s.min(initial=0)) & (seen_s <= stamps_s.max(initial=0))
-    par = light["par_umol_m2_s"].transpose("sensor", "time").to_numpy()
-    tables = []
-    for label, series in zip(light["sensor"].to_numpy().astype(str), par, strict=True):
-        rng = np.random.default_rng(stream_seed(seed, "measured", label))
-        gain = 1.0 + calibration_relative * rng.standard_normal()
-        relative, constant = rng.standard_normal((2, len(series)))
-        true = np.interp(seen_s, stamps_s, series) * gain
-        record = true * (1.0 + noise_relative * relative) + noise_umol_m2_s * constant
-        values = np.maximum(record, 0.0)[kept]
-        tables.append(pd.DataFrame(dict(zip(COLUMNS, (label, times[kept], values), strict=True))))
-    return pd.concat(tables, ignore_index=True)
-
-
 def _sorted(records: pd.DataFrame) -> pd.DataFrame:
     order = {label: k for k, label in enumerate(records["sensor"].unique())}
     rank = records["sensor"].map(order)
     return (
         records.assign(rank=rank)
         .sort_values(["rank", "time"], kind="stable", ignore_index=True)
-        .drop(columns="rank")[COLUMNS]
+        .drop(columns="rank")
     )
 
 
-def _check_records(records: pd.DataFrame, path: Path) -> None:
+def _check(records: pd.DataFrame, where: str | Path) -> None:
     if records.empty:
-        raise InputError(path, "no record", "at least one value", "Is the file complete?")
+        raise InputError(where, "no record", "at least one value", "Is the file complete?")
     repeated = records.duplicated(["sensor", "time"])
     if repeated.any():
         row = records[repeated].iloc[0]
         raise InputError(
-            path,
+            where,
             f"two values of sensor {row['sensor']} at {row['time']}",
             "one record per sensor and time",
             "Remove one of them.",
@@ -195,8 +368,8 @@ def _check_records(records: pd.DataFrame, path: Path) -> None:
     if wrong.any():
         row = records[wrong].iloc[0]
         raise InputError(
-            path,
+            f"{where}, line {row['line']}",
             f"{row['par_umol_m2_s']:g} µmol m⁻² s⁻¹ of sensor {row['sensor']} at {row['time']}",
             f"{MIN_PAR_UMOL_M2_S:g} to {MAX_PAR_UMOL_M2_S:g}",
-            "Check the calibration and the unit, or remove the record.",
+            "Check the calibration and the unit (`measured.unit`), or remove the record.",
         )

@@ -1,0 +1,71 @@
+"""What is noticed about the files that a run is given: said, written down, or a reason to stop."""
+
+import sys
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Literal
+
+from dapple.errors import InputError
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing noticed.
+
+    Attributes
+    ----------
+    level : {"error", "warning", "note"}
+        What makes results wrong; what may; what is good to know.
+    where : str
+        File, column or key.
+    found, expected, remedy : str
+        As in `InputError`; a note has no expectation and no remedy.
+    """
+
+    level: Literal["error", "warning", "note"]
+    where: str
+    found: str
+    expected: str = ""
+    remedy: str = ""
+
+    def __str__(self) -> str:
+        expected = f"; expected {self.expected}" if self.expected else ""
+        return f"{self.where}: found {self.found}{expected}. {self.remedy}".strip()
+
+
+def error(where: str | Path, found: str, expected: str, remedy: str) -> Finding:
+    """What makes results wrong."""
+    return Finding("error", str(where), found, expected, remedy)
+
+
+def warning(where: str | Path, found: str, expected: str = "", remedy: str = "") -> Finding:
+    """What may make results wrong."""
+    return Finding("warning", str(where), found, expected, remedy)
+
+
+def note(where: str | Path, found: str) -> Finding:
+    """What is good to know."""
+    return Finding("note", str(where), found)
+
+
+def stop(findings: Iterable[Finding]) -> None:
+    """Raise an `InputError` of the first error; the others follow in its remedy."""
+    errors = [one for one in findings if one.level == "error"]
+    if errors:
+        first, *others = errors
+        remedy = " ".join([first.remedy, *(f"Besides, {one}" for one in others)])
+        raise InputError(first.where, first.found, first.expected, remedy)
+
+
+def say(findings: Iterable[Finding]) -> None:
+    """Print warnings on the terminal, past the log of a rule, and everything into the log."""
+    for one in findings:
+        print(f"{one.level}: {one}")
+        if one.level != "note" and sys.__stderr__ is not None:
+            print(f"dapple: {one.level}: {one}", file=sys.__stderr__)
+
+
+def rows(findings: Iterable[Finding]) -> list[dict[str, str]]:
+    """Findings as they are written into a JSON file."""
+    return [asdict(one) for one in findings]

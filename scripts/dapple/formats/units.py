@@ -1,0 +1,171 @@
+"""Units of light as people write them, and the factors between them."""
+
+import re
+from collections.abc import Sequence
+
+from dapple import findings
+from dapple.errors import InputError
+from dapple.findings import Finding
+
+SUNLIGHT_UMOL_PER_J = 4.57
+"""Photons of 400 to 700 nm in a joule of sunlight of that range (Thimijan and Heins 1983)."""
+
+POWERS = {"W/m2": 1.0, "kW/m2": 1e3, "mW/cm2": 10.0}
+"""Irradiance in W m⁻²."""
+ENERGIES = {"J/m2": 1.0, "kJ/m2": 1e3, "MJ/m2": 1e6, "J/cm2": 1e4, "Wh/m2": 3.6e3, "kWh/m2": 3.6e6}
+"""Sums over an interval, in J m⁻²."""
+PHOTONS = {"umol/m2/s": 1.0, "mmol/m2/s": 1e3, "W/m2": SUNLIGHT_UMOL_PER_J}
+"""Photon flux of 400 to 700 nm in µmol m⁻² s⁻¹; W/m2: of PAR."""
+PHOTON_SUMS = {"mol/m2": 1e6, "mmol/m2": 1e3}
+"""Sums over an interval, in µmol m⁻²."""
+
+IRRADIANCES = (*POWERS, *ENERGIES)
+PHOTON_FLUXES = (*PHOTONS, *PHOTON_SUMS)
+
+# After `_squeezed`: powers, signs and blanks away.
+SPELLINGS = {
+    "W/m2": ("wm2", "watt", "watts", "w", "watt/m2"),
+    "kW/m2": ("kwm2", "kw"),
+    "mW/cm2": ("mwcm2",),
+    "J/m2": ("jm2",),
+    "kJ/m2": ("kjm2",),
+    "MJ/m2": ("mjm2",),
+    "J/cm2": ("jcm2",),
+    "Wh/m2": ("whm2", "whrm2"),
+    "kWh/m2": ("kwhm2", "kwhrm2"),
+    "umol/m2/s": ("umolm2s", "umolm2s1", "umolsm2", "umols1m2", "umol", "ue", "uem2s", "uem2s1",
+                  "ueinstein", "umolphotonsm2s", "umolphotonsm2s1", "ppfd"),
+    "mmol/m2/s": ("mmolm2s", "mmolm2s1"),
+    "mol/m2": ("molm2", "mol"),
+    "mmol/m2": ("mmolm2",),
+}  # fmt: skip
+KNOWN = {spelling: unit for unit, spellings in SPELLINGS.items() for spelling in spellings}
+OTHER_UNITS = {"nm", "um", "m", "mm", "cm", "s", "min", "h", "degc", "c", "%", "ts", "rn", "v",
+               "mv", "volts", "deg", "utc", "hpa", "lux", "lx", "klx"}  # fmt: skip
+
+
+def named(text: str) -> str | None:
+    """The unit of light that a text spells, or None.
+
+    `W m⁻²`, `W/m^2`, `global_W_m2` and `Wm-2` are W/m2; `uE`, `µmol m-2 s-1` and `par_umolm2s` are
+    umol/m2/s.
+    """
+    squeezed = _squeezed(text)
+    if squeezed in KNOWN:
+        return KNOWN[squeezed]
+    words = re.split(r"[_\s,;]+", text.strip())
+    for start in range(1, len(words)):  # the unit at the end of a name
+        tail = _squeezed("".join(words[start:]))
+        if tail in KNOWN and len(tail) > 1:
+            return KNOWN[tail]
+    return None
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit and nothing else."""
+    squeezed = _squeezed(text)
+    return squeezed in KNOWN or squeezed in OTHER_UNITS or text.strip() == "°C"
+
+
+def of_column(
+    in_file: str, column: str, declared: str, *, where: str, key: str, known: Sequence[str]
+) -> tuple[str, list[Finding]]:
+    """The unit of a column: the declared one, that of cells or header, or that of its name.
+
+    Parameters
+    ----------
+    in_file : str
+        Unit in the cells or the header, "" where there is none.
+    column : str
+        Name of the column.
+    declared : str
+        Unit of the configuration, "" where none is declared.
+    where, key : str
+        File and column, and key of the configuration, for messages.
+    known : sequence of str
+        Units that the quantity can have.
+
+    Returns
+    -------
+    unit : str
+        "" where nobody says.
+    findings : list of Finding
+        A warning where configuration and file disagree; the configuration is followed.
+
+    Raises
+    ------
+    InputError
+        The file has a unit that the quantity cannot have, and none is declared.
+    """
+    found = named(in_file) if in_file else named(column)
+    if declared:
+        doubt = findings.warning(
+            where, f"the unit {found}", f"{declared}, as `{key}` says", "The key is followed."
+        )
+        return declared, [doubt] if found and found != declared else []
+    if (in_file and found is None) or (found and found not in known):
+        raise InputError(
+            where,
+            f"the unit '{in_file or found}'",
+            f"one of {', '.join(known)}",
+            f"Declare it as `{key}`, or convert the values.",
+        )
+    return found or "", []
+
+
+def irradiance_factor(unit: str, interval_min: float | None, where: str) -> float:
+    """What a value has to be multiplied by to be W m⁻².
+
+    Parameters
+    ----------
+    unit : str
+        A key of `POWERS` or `ENERGIES`.
+    interval_min : float or None
+        Over which a sum was taken [min].
+    where : str
+        File and column, for messages.
+
+    Raises
+    ------
+    InputError
+        A sum over an unknown interval, or a unit that is none of irradiance.
+    """
+    return _factor(unit, POWERS, ENERGIES, interval_min, where)
+
+
+def photon_factor(unit: str, interval_min: float | None, where: str) -> float:
+    """What a value has to be multiplied by to be µmol m⁻² s⁻¹; see `irradiance_factor`."""
+    return _factor(unit, PHOTONS, PHOTON_SUMS, interval_min, where)
+
+
+def _factor(
+    unit: str,
+    rates: dict[str, float],
+    sums: dict[str, float],
+    interval_min: float | None,
+    where: str,
+) -> float:
+    if unit in rates:
+        return rates[unit]
+    if unit not in sums:
+        raise InputError(
+            where,
+            f"the unit '{unit}'",
+            f"one of {', '.join([*rates, *sums])}",
+            "Convert the values, or declare their unit.",
+        )
+    if not interval_min:
+        raise InputError(
+            where,
+            f"sums in {unit} over an unknown interval",
+            "the length of the interval",
+            "Set `interval_min` for this table.",
+        )
+    return sums[unit] / (60.0 * interval_min)
+
+
+def _squeezed(text: str) -> str:
+    """A unit without powers' signs, blanks and dots: `µmol m⁻² s⁻¹` is `umolm2s1`."""
+    plain = text.strip().lower()
+    plain = plain.translate(str.maketrans({"µ": "u", "μ": "u", "²": "2", "¹": "1", "⁻": ""}))
+    return re.sub(r"[\s/_.·⋅*^()\[\]-]", "", plain)

@@ -1,0 +1,237 @@
+"""Radiation tables of loggers and weather services: what they say, in W m⁻² and UTC."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from dapple import findings, timezones
+from dapple.errors import InputError
+from dapple.findings import Finding
+from dapple.formats import units, user_tables
+from dapple.formats.user_tables import LIGHT_FLAGS, TIME_NAMES, Table
+from dapple.times import AHEAD, parse
+
+GLOBAL_NAMES = ("global_W_m2", "global", "ghi", "globalstrahlung")
+DIFFUSE_NAMES = ("diffuse_W_m2", "diffuse", "dhi", "diffusstrahlung")
+MAX_STEP_MIN = 180.0
+
+
+@dataclass(frozen=True)
+class Radiation:
+    """Measured broadband radiation.
+
+    Attributes
+    ----------
+    table : pandas.DataFrame
+        By ascending stamp (UTC): `global_w_m2`, and `diffuse_w_m2` where it was measured [W m⁻²];
+        rows without a value of global are left out, diffuse may be NaN.
+    interval_min : float
+        Length of the interval of which a row is the mean [min]; 0: samples of a moment.
+    label : {"instant", "start", "middle", "end"}
+        What of its interval a stamp marks.
+    is_declared : bool
+        Whether configuration or layout say so; else it is assumed.
+    where : str
+        The file.
+    findings : tuple of Finding
+        What was noticed while reading.
+    facts : dict
+        What was read: layout, columns, units, rows, what was left out.
+    """
+
+    table: pd.DataFrame
+    interval_min: float
+    label: str
+    is_declared: bool
+    where: str
+    findings: tuple[Finding, ...] = ()
+    facts: dict = field(default_factory=dict)
+
+    @property
+    def step_min(self) -> float:
+        """Median step between rows [min]; NaN for a single row."""
+        steps = np.diff(self.table.index.asi8) / 60e9
+        return float(np.median(steps)) if len(steps) else np.nan
+
+    def intervals(self, label: str = "", interval_min: float | None = None) -> np.ndarray:
+        """First and last moment (2, n) of every row, ns since 1970."""
+        length_ns = (self.interval_min if interval_min is None else interval_min) * 60e9
+        middle = self.table.index.asi8 + AHEAD[label or self.label] * length_ns
+        return np.stack([middle - 0.5 * length_ns, middle + 0.5 * length_ns]).astype(np.int64)
+
+    def middles(self) -> pd.DatetimeIndex:
+        """The middle of every row's interval, UTC."""
+        return pd.DatetimeIndex(pd.to_datetime(self.intervals().mean(axis=0), utc=True))
+
+
+def read(
+    path: str | Path,
+    *,
+    time_column: str = "",
+    global_column: str = "",
+    diffuse_column: str = "",
+    timezone: str = "",
+    time_format: str = "",
+    interval_label: str = "",
+    interval_min: float = 0.0,
+    unit: str = "",
+    decimal: str = "",
+    missing: Sequence[str | float] = (),
+) -> Radiation:
+    """Read measured broadband radiation.
+
+    Parameters
+    ----------
+    path : path
+        A text table in any layout of `dapple.formats.user_tables`.
+    time_column, global_column, diffuse_column : str
+        Times, global and diffuse irradiance on the horizontal; empty: found by the usual names or
+        the file's layout. Diffuse may be absent.
+    timezone, time_format : str
+        See `times.parse`; a column that ends in `_utc`, and some layouts, need no zone.
+    interval_label : {"", "instant", "start", "middle", "end"}
+        What a stamp marks; empty: what the layout says, else a moment.
+    interval_min : float
+        Length of the intervals [min]; 0: the layout's, else the step between rows.
+    unit : str
+        Of global and diffuse (`units.POWERS`, `units.ENERGIES`); empty: as the header says, else
+        W/m2.
+    decimal : {"", ".", ","}
+        Decimal sign; empty: as the cells show.
+    missing : texts or numbers
+        Flags of missing values, besides `LIGHT_FLAGS`.
+
+    Raises
+    ------
+    InputError
+        No file or column, unreadable times, two values at one time, text that is no number, sums
+        over an unknown interval, or nothing left.
+    """
+    source = user_tables.read(path, decimal=decimal)
+    zone = timezone or source.timezone
+    time_name = _column(source, time_column, "time", TIME_NAMES, "radiation.time_column")
+    index = parse(source.text(time_name), path, zone, time_format=time_format)
+    names = {
+        "global_w_m2": _column(
+            source, global_column, "global", GLOBAL_NAMES, "radiation.global_column"
+        ),
+        "diffuse_w_m2": _diffuse_column(source, diffuse_column),
+    }
+    columns = {kind: name for kind, name in names.items() if name}
+    numbers = {
+        kind: source.numbers(name, (*LIGHT_FLAGS, *missing)) for kind, name in columns.items()
+    }
+    table = pd.DataFrame({kind: one.values for kind, one in numbers.items()}, index=index)
+    dropped = {columns[kind]: one.missing for kind, one in numbers.items() if one.missing}
+    table = table[table["global_w_m2"].notna()]
+    if table.empty:
+        raise InputError(path, "no row with a value", "radiation by time", "Is the file complete?")
+    repeated = int(table.index.duplicated().sum())
+    table = _unique(table, str(path)).sort_index()
+    label, length_min, is_declared = _interval(source, table, interval_label, interval_min)
+    noticed, used = [], {}
+    for kind, one in numbers.items():
+        where = f"{path}, column {columns[kind]!r}"
+        used[kind], doubt = units.of_column(
+            one.unit,
+            columns[kind],
+            unit,
+            where=where,
+            key="radiation.unit",
+            known=units.IRRADIANCES,
+        )
+        noticed += doubt
+        step = length_min or interval_min or _step_min(table)
+        table[kind] *= units.irradiance_factor(used[kind] or "W/m2", step, where)
+    noticed += [
+        findings.note(
+            path, f"{sum(flags.values())} values of {name} missing ({user_tables.counted(flags)})"
+        )
+        for name, flags in dropped.items()
+    ]
+    if repeated:
+        noticed.append(findings.note(path, f"{repeated} rows twice, each read once"))
+    if text := timezones.note(zone):
+        noticed.append(
+            findings.warning(path, f"the time zone {text}", "", "Declare the offset if it does.")
+        )
+    if zone and timezone and source.timezone and zone != source.timezone:
+        noticed.append(
+            findings.warning(
+                path, f"the zone {source.timezone} in the file", f"{timezone}, as declared"
+            )
+        )
+    facts = {
+        "path": str(path),
+        "layout": source.layout,
+        "columns": {"time": time_name, **columns},
+        "units": {columns[kind]: name or "W/m2 (assumed)" for kind, name in used.items()},
+        "timezone": zone or ("UTC" if time_name.lower().endswith("_utc") else "in the file"),
+        "interval_label": label,
+        "interval_min": length_min,
+        "rows": len(source.cells),
+        "rows_used": len(table),
+        "missing": dropped,
+        "repeated": repeated,
+    }
+    return Radiation(table, length_min, label, is_declared, str(path), tuple(noticed), facts)
+
+
+def _column(source: Table, name: str, role: str, usual: Sequence[str], key: str) -> str:
+    """The declared column, that of the layout, or the one with a usual name."""
+    if name:
+        return source.require([name], key)
+    return source.known.get(role) or source.require(usual, key)
+
+
+def _diffuse_column(source: Table, name: str) -> str | None:
+    if name:
+        return source.require([name], "radiation.diffuse_column")
+    return source.known.get("diffuse") or source.find(DIFFUSE_NAMES)
+
+
+def _interval(
+    source: Table, table: pd.DataFrame, label: str, interval_min: float
+) -> tuple[str, float, bool]:
+    """Label and length of the intervals, and whether somebody said so."""
+    chosen = label or source.interval_label or ("instant" if source.interval_min == 0 else "")
+    if chosen in ("", "instant"):
+        return "instant", 0.0, bool(chosen)
+    length = interval_min or source.interval_min or _step_min(table)
+    if not length:
+        raise InputError(
+            source.path, "a single row", "the length of its interval", "Set `interval_min`."
+        )
+    if length > MAX_STEP_MIN:
+        raise InputError(
+            source.path,
+            f"means over {length:g} min",
+            f"{MAX_STEP_MIN:g} min or less: the course of a day is not in them",
+            "Give hourly means or finer ones.",
+        )
+    return chosen, float(length), True
+
+
+def _step_min(table: pd.DataFrame) -> float:
+    steps = np.diff(table.index.asi8) / 60e9
+    return float(np.median(steps)) if len(steps) else 0.0
+
+
+def _unique(table: pd.DataFrame, where: str) -> pd.DataFrame:
+    """Rows that are there twice read once; two values at one time are refused."""
+    first = table[~table.index.duplicated()]
+    again = table[table.index.duplicated()]
+    before = first.reindex(again.index).to_numpy()
+    same = (before == again.to_numpy()) | np.isnan(before) | np.isnan(again.to_numpy())
+    if not same.all():
+        time = again.index[~same.all(axis=1)][0]
+        raise InputError(
+            where,
+            f"two different values at {time}",
+            "each time once",
+            "Remove one of the rows; where a clock was set back, give the zone or the offset.",
+        )
+    return first

@@ -1,0 +1,147 @@
+"""Ways in which people write times: which of them a column has."""
+
+import re
+
+import numpy as np
+import pandas as pd
+
+from dapple.errors import InputError
+
+ISO = "ISO8601"
+# Tried in this order; a column has the first in which every row is a time.
+CLEAR = (
+    "%Y%m%d%H%M",
+    "%Y%m%d%H%M%S",
+    "%Y%m%d%H:%M",
+    "%Y%m%d:%H%M",
+    "%Y%m%d %H:%M",
+    "%Y%m%d %H:%M:%S",
+    "%Y%m%d %H%M",
+    "%Y%m%d %H%M%S",
+    "%Y/%m/%d %H:%M",
+    "%Y/%m/%d %H:%M:%S",
+    "%d.%m.%Y %H:%M",
+    "%d.%m.%Y %H:%M:%S",
+    "%d.%m.%y %H:%M",
+    "%d.%m.%y %H:%M:%S",
+    "%d-%b-%Y %H:%M",
+    "%d-%b-%Y %H:%M:%S",
+    "%d %b %Y %H:%M",
+    "%d %b %Y %H:%M:%S",
+)
+CLOCKS = ("%H:%M", "%H:%M:%S", "%H:%M:%S.%f", "%I:%M %p", "%I:%M:%S %p")
+DAY_FIRST, MONTH_FIRST = (
+    [f"{date}{year} {clock}" for clock in CLOCKS for year in ("%Y", "%y")]
+    for date in ("%d/%m/", "%m/%d/")
+)
+FIRST_YEAR, LAST_YEAR = 1950, 2100
+
+
+def naive(text: pd.Series, where: str, time_format: str = "") -> pd.DatetimeIndex:
+    """Times without a zone from text.
+
+    Parameters
+    ----------
+    text : pandas.Series of str
+        Without offsets.
+    where : str
+        File and column, for messages.
+    time_format : str
+        See `times.parse`.
+
+    Raises
+    ------
+    InputError
+        Text that is no time, in no known way of writing; or days and months that may be exchanged.
+    """
+    if time_format:
+        return _declared(text, where, time_format)
+    plain, next_day = _midnights(text.str.replace("T", " ").str.replace(",", "."))
+    found = _first_of([ISO, *CLEAR], plain)
+    if found is None:
+        # 8/10/2023 and 8-10-2023: which is the day?
+        slashed = plain.str.replace(r"^(\d{1,2})-(\d{1,2})-(\d{2,4})", r"\1/\2/\3", regex=True)
+        found = _day_or_month(slashed, where)
+    if found is None:
+        raise _no_time(text, plain, where)
+    return pd.DatetimeIndex(found) + pd.to_timedelta(next_day.to_numpy().astype(int), unit="D")
+
+
+def _declared(text: pd.Series, where: str, time_format: str) -> pd.DatetimeIndex:
+    if time_format in ("epoch", "excel"):
+        numbers = pd.to_numeric(text, errors="coerce")
+        unit, origin = ("s", "unix") if time_format == "epoch" else ("D", "1899-12-30")
+        times = pd.to_datetime(numbers, unit=unit, origin=origin, errors="coerce")
+        times = times.dt.round("s") if time_format == "excel" else times
+    else:
+        plain, next_day = _midnights(text)
+        times = pd.to_datetime(plain, format=time_format, errors="coerce")
+        times = times + pd.to_timedelta(next_day.astype(int), unit="D")
+    if (wrong := times.isna()).any():
+        raise InputError(
+            f"{where}, line {text.index[wrong][0]}",
+            f"'{text[wrong].iloc[0]}'",
+            f"a time written as `time_format: {time_format}` says",
+            "Correct the row or the format.",
+        )
+    return pd.DatetimeIndex(times)
+
+
+def _midnights(text: pd.Series) -> tuple[pd.Series, pd.Series]:
+    """24:00 as 00:00, and whether a row was so."""
+    is_24 = text.str.contains(r"(?:^|\D|\d{8})24:?00(?::?00)?$", regex=True)
+    plain = text.where(~is_24, text.str.replace(r"24(:?00(?::?00)?)$", r"00\1", regex=True))
+    return plain, is_24
+
+
+def _first_of(formats: list[str], text: pd.Series) -> pd.Series | None:
+    for one in formats:
+        if one == ISO and not text.str.match(r"^\d{4}-\d{2}-\d{2}").all():
+            continue  # "20230810" alone, or a number, is not meant
+        times = pd.to_datetime(text, format=one, errors="coerce")
+        if times.notna().all() and times.dt.year.between(FIRST_YEAR, LAST_YEAR).all():
+            return times
+    return None
+
+
+def _day_or_month(text: pd.Series, where: str) -> pd.Series | None:
+    """The one order of day and month in which the rows are times, steps considered."""
+    day, month = _first_of(DAY_FIRST, text), _first_of(MONTH_FIRST, text)
+    if day is None or month is None or day.equals(month):
+        return month if day is None else day
+    longest = [times.sort_values().diff().max() for times in (day, month)]
+    if min(longest) <= pd.Timedelta(days=2) < max(longest):
+        return day if longest[0] < longest[1] else month
+    raise InputError(
+        where,
+        f"{text.iloc[0]}, which may be {day.iloc[0]:%d %B %Y} or {month.iloc[0]:%d %B %Y}",
+        "a day and a month that can be told apart",
+        "Write times in ISO 8601 (2023-08-10 10:10:00), or set `time_format`, for example "
+        "'%d/%m/%Y %H:%M'.",
+    )
+
+
+def _no_time(text: pd.Series, plain: pd.Series, where: str) -> InputError:
+    """Names the row that stops the way of writing that fits the others."""
+    if text.str.fullmatch(r"\d{5,19}(\.\d+)?").all():
+        number = float(text.iloc[0])
+        hint = (
+            "Set `time_format: epoch`."
+            if 9 <= len(text.iloc[0].split(".")[0]) <= 10
+            else "Set `time_format: excel`."
+            if 20_000 < number < 60_000
+            else "Seconds since 1970 have ten digits; write times in full, in ISO 8601."
+        )
+        return InputError(where, f"numbers such as {text.iloc[0]}", "times", hint)
+    best = np.zeros(len(text), bool)
+    for one in (ISO, *CLEAR, *DAY_FIRST, *MONTH_FIRST):
+        fits = pd.to_datetime(plain, format=one, errors="coerce").notna().to_numpy()
+        best = fits if fits.sum() > best.sum() else best
+    row = int(best.argmin())
+    has_clock = bool(re.search(r"\d:\d|\d{10}", text.iloc[row]))
+    return InputError(
+        f"{where}, line {text.index[row]}",
+        f"'{text.iloc[row]}'" + ("" if has_clock else ", a day without a time"),
+        "times such as 2023-08-10 10:10:00",
+        "Write times in ISO 8601, or set `time_format` for this table.",
+    )

@@ -1,0 +1,345 @@
+"""Radiation tables: read, doubted, spread over their intervals, and filled where they have gaps."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from tests.unit.weather import FREIBURG, minutes, station
+
+from dapple.errors import InputError
+from dapple.findings import stop
+from dapple.sky import plausible, radiation_clock, radiation_series, radiation_table, sun
+from dapple.times import time_range
+
+AFTERNOON = time_range("2023-08-10 10:10", "2023-08-10 16:50", 10, "UTC")
+
+
+def table_file(tmp_path, rows, header="time_utc,global_W_m2,diffuse_W_m2"):
+    path = tmp_path / "radiation.csv"
+    path.write_text(f"{header}\n{rows}")
+    return path
+
+
+def at(path, times, **options):
+    return radiation_series.at(radiation_table.read(path), times, FREIBURG, **options).values
+
+
+# --- reading ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ("2023-08-10 11:00,,90\n", "no row with a value"),
+        ("2023-08-10 11:00,800,90\n2023-08-10 11:00,810,90\n", "two different values at"),
+        ("2023-08-10 11:00,many,90\n", "line 2: found 'many'"),
+        ("eleven,800,90\n", "ISO 8601"),
+        ("", "no row with a value"),
+    ],
+)
+def test_a_broken_table_is_refused(tmp_path, rows, message):
+    with pytest.raises(InputError, match=message):
+        radiation_table.read(table_file(tmp_path, rows))
+
+
+def test_a_table_in_local_time_needs_its_zone(tmp_path):
+    path = table_file(tmp_path, "2023-08-10 13:00,800,90\n", "time,global_W_m2,diffuse_W_m2")
+    with pytest.raises(InputError, match="naive timestamp"):
+        radiation_table.read(path)
+    table = radiation_table.read(path, timezone="Europe/Berlin").table
+    assert table.index[0] == pd.Timestamp("2023-08-10 11:00", tz="UTC")
+    with pytest.raises(InputError, match=r"Name the column in `radiation.time_column`"):
+        radiation_table.read(path, time_column="stamp", timezone="UTC")
+
+
+def test_what_is_missing_or_twice_is_left_out_and_said(tmp_path):
+    rows = "2023-08-10 11:00,800,90\n2023-08-10 11:00,800,90\n2023-08-10 11:10,-999,-999\n"
+    read = radiation_table.read(table_file(tmp_path, rows + "2023-08-10 11:20,790,NAN\n"))
+    assert read.table["global_w_m2"].tolist() == [800, 790]
+    said = " ".join(map(str, read.findings))
+    assert "1 values of global_W_m2 missing (1 × '-999')" in said
+    assert "1 × '-999', 1 × 'NAN'" in said
+    assert "1 rows twice" in said
+    assert (read.facts["rows"], read.facts["rows_used"]) == (4, 2)
+
+
+def test_units_come_from_key_header_or_layout_and_sums_take_the_interval(tmp_path):
+    rows = "2023-08-10 11:10,48,6\n2023-08-10 11:20,48,6\n"
+    path = table_file(tmp_path, rows, "time_utc,global [J/cm2],diffuse [J/cm2]")
+    read = radiation_table.read(path, interval_label="end")
+    assert read.table.iloc[0].tolist() == pytest.approx([800.0, 100.0])  # over 600 s
+    assert read.interval_min == 10.0
+    path = table_file(tmp_path, rows, "time_utc,global,diffuse")
+    declared = radiation_table.read(path, unit="J/cm2", interval_label="end", interval_min=10)
+    assert declared.table.equals(read.table)
+    path = table_file(tmp_path, rows, "time_utc,global [lx],diffuse [lx]")
+    with pytest.raises(InputError, match="unit 'lx'"):
+        radiation_table.read(path)
+
+
+def test_ten_minute_sums_of_dwd_need_no_key(tmp_path):
+    path = tmp_path / "produkt_zehn_min_sd_20230810.txt"
+    path.write_text(
+        "STATIONS_ID;MESS_DATUM;  QN;DS_10;GS_10;SD_10;LS_10;eor\n"
+        "       1443;202308101110;    3;   6.0;  48.0;0.167;-999;eor\n"
+        "       1443;202308101120;    3;-999;  47.4;0.167;-999;eor\n"
+    )
+    read = radiation_table.read(path)
+    assert read.table["global_w_m2"].tolist() == pytest.approx([800.0, 790.0])
+    assert (read.label, read.interval_min, read.facts["layout"]) == ("end", 10.0, "DWD")
+    assert read.middles()[0] == pd.Timestamp("2023-08-10 11:05", tz="UTC")
+
+
+# --- any time -----------------------------------------------------------------------------------
+
+
+def test_samples_are_met_and_never_overshot_between_them(tmp_path):
+    path = table_file(
+        tmp_path,
+        "2023-08-10 11:00,800,90\n2023-08-10 11:10,800,90\n2023-08-10 11:20,300,250\n"
+        "2023-08-10 11:30,820,95\n",
+    )
+    got = at(path, time_range("2023-08-10 11:00", "2023-08-10 11:30", 1, "UTC"))
+    assert got["global_w_m2"].iloc[[0, 10, 20, 30]].to_numpy() == pytest.approx(
+        [800, 800, 300, 820]
+    )
+    assert got["global_w_m2"].between(300 - 1e-9, 820 + 1e-9).all()
+    assert not got["modelled"].any()
+
+
+def test_outside_and_in_gaps_of_a_table_the_model_joins_without_a_step(tmp_path):
+    path = table_file(
+        tmp_path,
+        "2023-08-10 11:00,700,120\n2023-08-10 11:10,705,120\n"
+        "2023-08-10 14:00,600,100\n2023-08-10 14:10,590,100\n",
+    )
+    got = at(path, time_range("2023-08-10 10:00", "2023-08-10 15:00", 1, "UTC"))
+    minute = pd.Series(range(301), index=got.index)
+    measured = minute.between(60, 70) | minute.between(240, 250)
+    assert (got["modelled"] == ~measured).all()
+    assert got["global_w_m2"].diff().abs().max() < 3  # a step at a seam would be of 40 or more
+    # In the gap the day bends through its noon, above the straight line between its ends.
+    assert (got["global_w_m2"] - np.interp(minute, [70, 240], [705, 600])).iloc[155] > 20
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        "2023-08-10 04:30,27,1\n2023-08-10 04:40,40,2\n",  # ends at dawn
+        "2023-08-10 18:30,14,1.6\n2023-08-10 18:45,0.9,0.1\n",  # begins at dusk
+        "2023-08-10 04:30,27,1\n2023-08-10 04:40,40,2\n2023-08-10 18:30,14,1.6\n",
+    ],
+)
+def test_a_low_sun_does_not_scale_the_day(tmp_path, rows):
+    day = time_range("2023-08-10 03:00", "2023-08-10 20:00", 10, "UTC")
+    clear = sun.clear_sky(day, FREIBURG)["global_w_m2"]
+    series = radiation_series.at(radiation_table.read(table_file(tmp_path, rows)), day, FREIBURG)
+    noon = slice("2023-08-10 08:00", "2023-08-10 16:00")
+    assert series.values["global_w_m2"][noon].to_numpy() == pytest.approx(clear[noon].to_numpy())
+    assert "a clear sky stands in" in series.findings[0].remedy
+    assert series.facts["modelled_share_of_day"] > 0.9
+
+
+def test_one_minute_of_cloud_at_the_end_does_not_darken_the_rest_of_the_day():
+    truth = minutes(1, start="2023-08-10", clouds=False)
+    morning = truth[:"2023-08-10 11:00"].copy()
+    morning.loc["2023-08-10 10:59":] *= 0.2
+    got = radiation_series.at(station(morning, 1, "instant"), AFTERNOON, FREIBURG).values
+    after = got["2023-08-10 14:00":]["global_w_m2"] / truth["global_w_m2"].reindex(got.index)
+    assert after.dropna().min() > 0.95
+
+
+@pytest.mark.parametrize("label", ["start", "middle", "end"])
+@pytest.mark.parametrize("step_min", [10, 15, 60])
+def test_means_are_kept_when_they_are_spread_over_their_intervals(step_min, label):
+    truth = minutes(2, start="2023-08-10")
+    measured = station(truth, step_min, label)
+    fine = radiation_series.at(measured, truth.index, FREIBURG).values
+    again = station(fine[["global_w_m2", "diffuse_w_m2"]], step_min, label).table
+    for name in again:
+        sunny = measured.table[name] > 20
+        ratio = again[name][sunny] / measured.table[name][sunny]
+        assert ratio.to_numpy() == pytest.approx(1.0, abs=0.01)
+    assert not fine["modelled"][step_min:-step_min].any()
+
+
+def test_a_clear_day_comes_back_from_its_hourly_means():
+    truth = minutes(1, start="2023-08-10", clouds=False)
+    got = radiation_series.at(station(truth, 60, "end"), truth.index, FREIBURG).values
+    assert np.abs(got["global_w_m2"] - truth["global_w_m2"]).max() < 2.0
+
+
+def test_intervals_that_overlap_are_refused():
+    truth = minutes(1, start="2023-08-10", clouds=False)
+    running = replace(station(truth, 10, "end"), interval_min=60.0)
+    with pytest.raises(InputError, match="means of 60 min"):
+        radiation_series.at(running, AFTERNOON, FREIBURG)
+
+
+@pytest.mark.parametrize("model", ["erbs", "dirint"])
+def test_global_alone_is_split_by_a_model_and_said(model):
+    truth = minutes(3, start="2023-08-10")
+    alone = station(truth, 10, "middle", only_global=True)
+    series = radiation_series.at(alone, AFTERNOON, FREIBURG, diffuse_model=model)
+    known = radiation_series.at(station(truth, 10, "middle"), AFTERNOON, FREIBURG).values
+    assert f"model `{model}`" in series.findings[0].remedy
+    assert series.values["global_w_m2"].to_numpy() == pytest.approx(
+        known["global_w_m2"].to_numpy(), rel=0.02
+    )
+    share = (series.values["diffuse_w_m2"] / series.values["global_w_m2"]).mean()
+    assert share == pytest.approx((known["diffuse_w_m2"] / known["global_w_m2"]).mean(), abs=0.15)
+
+
+def test_a_table_of_another_day_is_refused(tmp_path):
+    path = table_file(tmp_path, "2023-08-11 11:00,700,120\n2023-08-11 11:10,705,120\n")
+    with pytest.raises(InputError, match="expected an overlap with the times"):
+        radiation_series.broadband(AFTERNOON, FREIBURG, kind="table", path=path)
+
+
+# --- doubt --------------------------------------------------------------------------------------
+
+STATIONS = {
+    "Freiburg": (FREIBURG, "2023-08-01"),
+    "Freiburg in winter": (FREIBURG, "2023-01-01"),
+    "Quito": (sun.Site(-0.18, -78.47, 2850.0), "2023-03-10"),
+    "Santiago": (sun.Site(-33.45, -70.66, 570.0), "2023-12-01"),
+    "Tromsø": (sun.Site(69.65, 18.96, 10.0), "2023-05-20"),
+}
+
+
+@pytest.mark.parametrize("place", STATIONS)
+@pytest.mark.parametrize("only_global", [False, True])
+def test_thirty_days_of_weather_raise_no_doubt(place, only_global):
+    site, start = STATIONS[place]
+    truth = minutes(30, start=start, site=site)
+    for step_min, label in ((10, "end"), (15, "start"), (60, "end")):
+        measured = station(truth, step_min, label, only_global=only_global)
+        assert plausible.check(measured, site) == []
+
+
+def test_cloud_edges_and_negative_nights_are_not_refused():
+    truth = minutes(2, start="2023-08-10", clouds=False)
+    truth.loc["2023-08-10 11:30":"2023-08-10 11:31", "global_w_m2"] *= 1.35
+    truth[truth < 1] = -4.0
+    doubts = plausible.check(station(truth, 1, "instant"), FREIBURG)
+    assert not [one for one in doubts if one.level == "error"]
+
+
+THIRTY = minutes(30)
+
+
+@pytest.mark.parametrize("only_global", [False, True])
+@pytest.mark.parametrize(
+    ("step_min", "factor", "unit"),
+    [
+        (10, 0.06, "J/cm2"),
+        (60, 0.36, "J/cm2"),
+        (60, 3.6, "kJ/m2"),
+        (60, 1e-3, "kWh/m2"),
+        (60, 3.6e-3, "MJ/m2"),
+        (10, 1 / 6, "Wh/m2"),
+        (10, 2.06, "PAR in µmol"),
+    ],
+)
+def test_another_unit_is_found_and_named(step_min, factor, unit, only_global):
+    wrong = station(THIRTY, step_min, "end", factor=factor, only_global=only_global)
+    with pytest.raises(InputError, match=f"fits {unit}"):
+        stop(plausible.check(wrong, FREIBURG))
+
+
+@pytest.mark.parametrize("only_global", [False, True])
+@pytest.mark.parametrize("step_min", [10, 15, 60])
+@pytest.mark.parametrize(
+    ("label", "assumed"), [("end", "start"), ("start", "end"), ("end", "instant")]
+)
+def test_another_label_is_found_and_named(step_min, label, assumed, only_global):
+    wrong = station(THIRTY, step_min, label, assumed=assumed, is_declared=False,
+                    only_global=only_global)  # fmt: skip
+    with pytest.raises(InputError, match=f"`radiation.interval_label: {label}`"):
+        stop(plausible.check(wrong, FREIBURG))
+
+
+@pytest.mark.parametrize(
+    ("ahead_min", "offset"), [(60, "+01:00"), (120, "+02:00"), (-300, "-05:00"), (23, "+00:23")]
+)
+def test_another_clock_is_found_with_the_offset_to_declare(ahead_min, offset):
+    wrong = station(THIRTY, 10, "end", ahead_min=ahead_min)
+    with pytest.raises(InputError, match=re.escape(f"`radiation.timezone: '{offset}'`")):
+        stop(plausible.check(wrong, FREIBURG))
+
+
+def test_a_declared_label_that_the_sun_contradicts_a_little_is_only_a_warning():
+    wrong = station(THIRTY, 15, "end", assumed="middle")
+    (doubt,) = plausible.check(wrong, FREIBURG)
+    assert doubt.level == "warning"
+    assert "`radiation.interval_label: end`" in doubt.remedy
+
+
+def test_light_at_night_is_another_zone_whatever_the_weather():
+    truth = minutes(5, seed=3)
+    truth["global_w_m2"] *= np.random.default_rng(1).uniform(0.3, 1.0, len(truth))  # no clear day
+    truth["diffuse_w_m2"] = truth["global_w_m2"]
+    wrong = station(truth, 10, "end", ahead_min=-300)
+    with pytest.raises(InputError, match="below the horizon"):
+        stop(plausible.check(wrong, FREIBURG))
+
+
+def test_columns_that_are_exchanged_are_named():
+    right = station(THIRTY, 10, "end")
+    swapped = right.table.set_axis(["diffuse_w_m2", "global_w_m2"], axis="columns")
+    with pytest.raises(InputError, match=r"`radiation.global_column: D`"):
+        stop(plausible.check(replace(right, table=swapped), FREIBURG))
+
+
+def test_a_diffuse_column_in_another_unit_is_found():
+    table = station(THIRTY, 10, "end").table
+    wrong = replace(
+        station(THIRTY, 10, "end"), table=table.assign(diffuse_w_m2=table["diffuse_w_m2"] * 0.06)
+    )
+    with pytest.raises(InputError, match="clean air alone scatters more"):
+        stop(plausible.check(wrong, FREIBURG))
+
+
+@pytest.mark.parametrize(
+    ("value", "sun_text"), [(3000.0, "physically possible"), (-60.0, "-20 to")]
+)
+def test_a_single_impossible_row_is_named(value, sun_text):
+    measured = station(THIRTY, 10, "end")
+    measured.table.iloc[70, 0] = value
+    with pytest.raises(InputError, match=sun_text):
+        stop(plausible.check(measured, FREIBURG))
+
+
+def test_half_a_day_says_nothing_of_the_clock():
+    truth = minutes(1, start="2023-08-10", clouds=False)["2023-08-10 11:00":"2023-08-10 16:50"]
+    assert radiation_clock.offset(station(truth, 10, "instant", ahead_min=60), FREIBURG) is None
+
+
+def test_a_sensor_out_of_level_does_not_move_the_clock():
+    truth = minutes(3, start="2023-08-10", clouds=False)
+    where = sun.position(truth.index, *FREIBURG.place)
+    zenith, azimuth = (np.radians(where[name]) for name in ("sun_zenith_deg", "sun_azimuth_deg"))
+    tilt = np.radians(1.0)  # towards east
+    beam = truth["global_w_m2"] - truth["diffuse_w_m2"]
+    seen = 1 + np.tan(np.minimum(zenith, np.radians(85))) * np.tan(tilt) * np.cos(
+        azimuth - np.pi / 2
+    )
+    tilted = truth.assign(global_w_m2=truth["diffuse_w_m2"] + beam * seen)
+    found = radiation_clock.offset(station(tilted, 10, "instant"), FREIBURG)
+    assert found is None or abs(found.minutes) < 3.0
+
+
+def test_an_implausible_table_can_be_reported_instead(tmp_path):
+    truth = minutes(1, start="2023-08-10", clouds=False)
+    table = station(truth, 60, "end", factor=1e-3).table
+    path = tmp_path / "kwh.csv"
+    table.rename_axis("time_utc").set_axis(["global", "diffuse"], axis="columns").to_csv(path)
+    hourly = {"kind": "table", "path": path, "interval_label": "end"}
+    with pytest.raises(InputError, match="kWh/m2"):
+        radiation_series.broadband(AFTERNOON, FREIBURG, **hourly)
+    series = radiation_series.broadband(AFTERNOON, FREIBURG, **hourly, implausible="report")
+    assert [one.level for one in series.findings] == ["error"]
+    right = radiation_series.broadband(AFTERNOON, FREIBURG, **hourly, unit="kWh/m2")
+    assert right.values["global_w_m2"].max() == pytest.approx(853, abs=3)
