@@ -16,11 +16,12 @@ import yaml
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
+from dapple import steps
 from dapple.config.settings import Settings, validate
 from dapple.formats import json, meshes, tables
-from dapple.light import series, transport, visibility
+from dapple.light import series
+from dapple.light.light_model import Model, Tracing
 from dapple.scene import scene_optics, traced
-from dapple.scene.surfaces import Scene, of_kinds
 from dapple.sky.radiation_series import broadband
 from dapple.sky.sky_radiance import sky_dataset
 from dapple.sky.sun import Site
@@ -30,7 +31,7 @@ from dapple.streams import stream_seed
 from dapple.times import time_range
 from dapple.virtual.leaves import along_wood
 
-EFFORT = {"n_paths": 2048, "n_sky_rays": 4096, "max_orders": 12, "n_patches": 577}
+RAYS = {"paths": 2048, "sky_rays": 4096, "max_shadow_rays": 4096}
 
 
 def main() -> None:
@@ -46,7 +47,7 @@ def main() -> None:
     rows = {
         "full model": run.score(full),
         "one placement of the leaves": run.score(full[:1]),
-        "a point for the sun": run.score(run.placements(run.leaves, sun_diameter_deg=0.0)),
+        "a point for the sun": run.score(run.placements(run.leaves, sun="point")),
         "leaves not clumped on shoots": run.score(run.placements(run.unclumped())),
         "an isotropic sky": run.score(run.placements(run.leaves, sky=isotropic)),
         "diffuse share of the clear-sky model": run.score(
@@ -68,6 +69,8 @@ class Run:
     def __init__(self, folder: Path, step_min: float):
         self.settings: Settings = validate(yaml.safe_load((folder / "config.yaml").read_text()))
         self.registration = json.read(folder / "registration/registration.json")
+        light = self.settings.light.model_dump(include={"sun_diameter_deg", "aperture_m"})
+        self.tracing = Tracing(**RAYS, **light)
         self.optics = scene_optics.read(folder / "sky/optics.nc")
         table = tables.read(folder / "sky/sensors.csv")
         path = Path(self.settings.data_dir) / self.settings.measured.path
@@ -114,22 +117,19 @@ class Run:
         n = range(len(self.leaves))
         return [along_wood(self.wood, **placing, seed=stream_seed(7, k)) for k in n]
 
-    def placements(self, leaves, sky=None, sun_diameter_deg=None) -> list[series.Light]:
+    def placements(self, leaves, sky=None, sun="disc") -> list[series.Light]:
         """Light under every placement of leaves."""
         sky = self.sky if sky is None else sky
         points_m = self.sensors[["x_m", "y_m", "z_m"]].to_numpy()
-        if sun_diameter_deg is None:
-            sun_diameter_deg = self.settings.light.sun_diameter_deg
+        model = Model(sun=sun, sky_patches=577, bands=len(self.optics))
         result = []
         for number, one in enumerate(leaves):
-            scene = Scene(of_kinds(leaf=one, wood=self.wood), None, self.settings.ground_z_m)
-            loaded = traced.load(scene)
-            seen = visibility.sunlit(
-                loaded, points_m, series.towards_sun(sky), tolerance=0.005, max_rays=4096,
-                sun_diameter_deg=sun_diameter_deg, seed=stream_seed(1, number),
-            )  # fmt: skip
-            paths = transport.collect(loaded, points_m, seed=stream_seed(2, number), **EFFORT)
-            result.append(series.compute(seen, paths, sky, self.optics, sun_kernel_deg=8.0))
+            meshes = {"leaf": one, "wood": self.wood}
+            scene = traced.load(steps.scene(meshes, ground_z_m=self.settings.ground_z_m))
+            of_sun, of_paths = (stream_seed(which, number) for which in (1, 2))
+            sunlit = steps.sun(scene, points_m, sky, model, self.tracing, seed=of_sun)
+            paths = steps.paths(scene, points_m, model, self.tracing, seed=of_paths)
+            result.append(steps.products(sunlit, paths, sky, self.optics, model, self.tracing))
         return result
 
     def score(self, placements, parts=("direct", "sky", "scattered")) -> dict[str, float]:

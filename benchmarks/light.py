@@ -25,12 +25,15 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 import crown
 import rays
 
+from dapple import steps
 from dapple.formats import meshes, netcdf, voxel_grids
-from dapple.light import series, transport, visibility
+from dapple.light import series
+from dapple.light.light_model import Model, Tracing
 from dapple.light.timestep_series import Reference
 from dapple.scene import scene_files, scene_optics, traced
 from dapple.scene.surfaces import LEAF, WOOD, Scene
 
+TIMED = ("load", "direct", "paths", "bands_and_write")
 KINDS = ("polygons", "voxels_0.2", "voxels_1.0")
 REFERENCE_RAYS = {
     "replicates": 16,
@@ -70,31 +73,23 @@ def once(folder: Path, variant: str, tolerance: float) -> dict[str, float]:
     scene = traced.load(scene_files.read([leaves], folder / "wood.ply")[0], variant)
     sky, optics = netcdf.read(folder / "sky.nc"), scene_optics.read(folder / "optics.nc")
     sensors = np.load(folder / "sensors.npy")
-    clock.append(time.perf_counter())
-    sunlit = visibility.sunlit(
-        scene,
-        sensors,
-        series.towards_sun(sky),
-        tolerance=series.DIRECT_SHARE * tolerance,
-        max_rays=1 << 16,
-        seed=1,
+    model = Model(sky_patches=577, max_orders=30, bands=len(optics))
+    tracing = Tracing(
+        paths=2048,
+        sky_rays=8192,
+        max_shadow_rays=1 << 16,
+        tolerance=tolerance,
+        max_growth=64,
         sun_diameter_deg=rays.SUN_DIAMETER_DEG,
     )
     clock.append(time.perf_counter())
-    counted = transport.collect(
-        scene,
-        sensors,
-        n_paths=2048,
-        n_patches=577,
-        max_orders=30,
-        seed=2,
-        tolerance=series.PATH_SHARE * tolerance,
-        optics=crown.optics(4),
-    )
+    sunlit = steps.sun(scene, sensors, sky, model, tracing, seed=1)
     clock.append(time.perf_counter())
-    result = series.compute(sunlit, counted, sky, optics, sun_kernel_deg=8.0)
+    counted = steps.paths(scene, sensors, model, tracing, optics=crown.optics(4), seed=2)
+    clock.append(time.perf_counter())
+    result = steps.products(sunlit, counted, sky, optics, model, tracing)
     names = [f"1_{k}" for k in range(len(sensors))]
-    netcdf.write(folder / "light.nc", series.summarise([result], names, sky))
+    netcdf.write(folder / "light.nc", series.as_dataset(result, names, netcdf.times(sky)))
     clock.append(time.perf_counter())
     cpu = time.process_time() - cpu
     open_sky = series.open_sky_par(sky).to_numpy()
@@ -103,8 +98,7 @@ def once(folder: Path, variant: str, tolerance: float) -> dict[str, float]:
     beam = series.level_beam(sky) / open_sky
     own = sunlit.share.std(axis=0, ddof=1) / np.sqrt(len(sunlit.share))
     plain = share**2 + (own**2 - sunlit.standard_error**2) * beam**2
-    steps = ("load", "direct", "paths", "bands_and_write")
-    return dict(zip(steps, np.diff(clock), strict=True)) | {
+    return dict(zip(TIMED, np.diff(clock), strict=True)) | {
         "shadow_rays": int(sunlit.n_rays.sum()) * len(sunlit.share),
         "n_paths": int(counted.n_paths.sum()) * counted.n_replicates,
         "truncated_share": float(counted.truncated_share(optics).max()),
@@ -168,7 +162,7 @@ def against_reference(folder: Path, scene: Scene, fast: dict, variant: str, n_co
     z = difference / np.hypot(np.hypot(error, mine), 1e-6)
     # What is left of the difference in variance is made up as rays at random would.
     at_equal_error = sky.sizes["time"] * variance / fast["error_of_replicates_rms"] ** 2
-    engine = sum(fast[step] for step in ("load", "direct", "paths", "bands_and_write"))
+    engine = sum(fast[step] for step in TIMED)
     return {
         "reference_per_time": seconds,
         "reference_rays_factor": factor,

@@ -23,7 +23,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 import crown
 import rays
 
-from dapple.light import series, transport, visibility
+from dapple import steps
+from dapple.light.light_model import Model, Tracing
 from dapple.scene import traced
 from dapple.scene.surfaces import Scene
 
@@ -86,14 +87,15 @@ def now() -> np.ndarray:
 
 def run(scene: traced.TracedScene, n_sensors: int, n_times: int) -> np.ndarray:
     """Wall and processor seconds (3, 2) of shadow rays, paths, and the product with all bands."""
-    sensors, sky = crown.sensors(n_sensors), crown.sky(n_times)
+    sensors, sky, optics = crown.sensors(n_sensors), crown.sky(n_times), crown.optics()
+    model = Model(sky_patches=577, max_orders=30, bands=len(optics))
+    tracing = Tracing(paths=1024, sky_rays=8192, max_shadow_rays=256, tolerance=2.0)
     clock = [now()]
-    suns = series.towards_sun(sky)
-    sunlit = visibility.sunlit(scene, sensors, suns, tolerance=1.0, max_rays=256, seed=1)
+    sunlit = steps.sun(scene, sensors, sky, model, tracing, seed=1)
     clock.append(now())
-    counted = transport.collect(scene, sensors, n_paths=1024, n_patches=577, max_orders=30, seed=2)
+    counted = steps.paths(scene, sensors, model, tracing, seed=2)
     clock.append(now())
-    series.compute(sunlit, counted, sky, crown.optics(), sun_kernel_deg=8.0)
+    steps.products(sunlit, counted, sky, optics, model, tracing)
     clock.append(now())
     return np.diff(clock, axis=0)
 

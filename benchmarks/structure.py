@@ -20,7 +20,8 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "scripts"))
 
 from dapple.formats.shots import Shots
 from dapple.structure.polygons import reconstruct
-from dapple.structure.voxels import Grid, plant_area_density
+from dapple.structure.voxel_sums import Grid
+from dapple.structure.voxels import plant_area_density
 
 PUBLISHED = {
     "polygons": "281 s on 24 cores (Frey et al. 2025)",

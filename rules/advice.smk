@@ -12,10 +12,7 @@ Makes   advice.yaml                       what each refinement changes and costs
 
 # What the pilot and the grid have in common with the run itself.
 PILOT = {
-    "max_orders": settings.light.transport.max_orders,
-    "sun_kernel_deg": settings.light.transport.sun_kernel_deg,
-    "sun_diameter_deg": settings.light.sun_diameter_deg,
-    "aperture_m": settings.light.aperture_m,
+    **tracing("max_orders"),
     "ground_z_m": settings.ground_z_m,
     "variant": f"{VARIANT}_mono",
 }
@@ -70,11 +67,16 @@ if LIT:
         resources:
             mem_mb=4000,
         params:
-            **settings.advice.model_dump(),
+            **settings.advice.model_dump(exclude={"paths"}),
             **PILOT,
-            shadow_tolerance=settings.light.transport.tolerance,
-            max_shadow_rays=settings.light.transport.max_shadow_rays,
-            source=settings.source,
+            tracing={"paths": settings.advice.paths, "sky_rays": settings.advice.paths}
+            | tracing(
+                "tolerance",
+                "max_shadow_rays",
+                "sun_kernel_deg",
+                "sun_diameter_deg",
+                "aperture_m",
+            ),
             seed=stream("advice"),
         message:
             said("what each refinement of the light changes and costs")
@@ -123,6 +125,7 @@ if LIT:
         params:
             **settings.tradeoff.model_dump(exclude={"max_orders"}),
             **PILOT,
+            tracing=tracing("sun_kernel_deg", "sun_diameter_deg", "aperture_m"),
             orders=settings.tradeoff.max_orders,
             polygon_size_m=settings.polygons.voxel_size_m,
             timestep=REFERENCE,

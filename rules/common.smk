@@ -18,6 +18,7 @@ from dapple.cloud.classifiers import CLASSIFIERS
 from dapple.config.settings import validate
 from dapple.errors import InputError
 from dapple.streams import stream_seed
+from dapple.structure.voxel_sizes import finer_than
 from dapple.workflow import code_of, short
 
 try:
@@ -45,6 +46,9 @@ REFERENCE = settings.light.timestep.model_dump(exclude={"step_min"}) | {
     "aperture_m": settings.light.aperture_m,
     "variant": f"{VARIANT}_rgb",
 }
+OF_BEAM = {"sun_diameter_deg", "aperture_m"}
+TRACING = settings.light.transport.model_dump()
+TRACING |= settings.light.model_dump(include=OF_BEAM)
 CHECKED = LIT if settings.light.engine == "transport" and settings.light.check else ()
 ADVISED = settings.light.model == "advised"
 COMPARED = LIT if settings.measured.kind != "none" else ()
@@ -123,6 +127,11 @@ def optics():
 OPTICS = optics()
 
 
+def tracing(*names):
+    """Some of the settings by which light is traced."""
+    return {name: TRACING[name] for name in names}
+
+
 def stream(*names):
     """The seed of one stage."""
     return stream_seed(settings.seed, *names)
@@ -162,10 +171,8 @@ def clumping_correction(wildcards):
     """Parameters of the voxels' correction, with the finer size that it looks into, or None."""
     if not settings.corrections.clumping:
         return None
-    ratio = float(wildcards.size) / (finest := min(settings.voxels.sizes_m))
-    is_multiple = ratio > 1.5 and abs(ratio - round(ratio)) < 1e-6
     return {
-        "finer_m": finest if is_multiple else None,
+        "finer_m": finer_than(float(wildcards.size), settings.voxels.sizes_m),
         "fill_range_m": settings.corrections.fill_range_m,
     }
 

@@ -99,8 +99,15 @@ if settings.light.engine == "transport":
         resources:
             mem_mb=4000,
         params:
-            **settings.light.transport.model_dump(exclude={"max_shadow_rays"}),
-            aperture_m=settings.light.aperture_m,
+            model=tracing("sky_patches", "max_orders"),
+            tracing=tracing(
+                "tolerance",
+                "sky_rays",
+                "paths",
+                "max_growth",
+                "sun_kernel_deg",
+                "aperture_m",
+            ),
             ground_z_m=settings.ground_z_m,
             variant=f"{VARIANT}_mono",
             seed=lambda wildcards: stream("transport", wildcards.placement),
@@ -131,11 +138,13 @@ if settings.light.engine == "transport":
         resources:
             mem_mb=4000,
         params:
-            tolerance=settings.light.transport.tolerance,
-            max_shadow_rays=settings.light.transport.max_shadow_rays,
-            sun_kernel_deg=settings.light.transport.sun_kernel_deg,
-            sun_diameter_deg=settings.light.sun_diameter_deg,
-            aperture_m=settings.light.aperture_m,
+            tracing=tracing(
+                "tolerance",
+                "max_shadow_rays",
+                "sun_kernel_deg",
+                "sun_diameter_deg",
+                "aperture_m",
+            ),
             ground_z_m=settings.ground_z_m,
             n_times=len(TIMES),
             variant=f"{VARIANT}_mono",

@@ -1,6 +1,5 @@
 """Trace the light of every pixel of a plot's images once, for any leaf and soil."""
 
-import resource
 import time
 
 from dapple.formats import json, rasters
@@ -9,7 +8,7 @@ from dapple.retrieval import coefficient_files as files
 from dapple.retrieval import image_paths, maps
 from dapple.retrieval.coefficients import Window, projection_error, remainder_bound
 from dapple.scene import scene_files, traced
-from dapple.workflow import options, run
+from dapple.workflow import options, peak_rss_mb, run
 
 BRIGHT = ([[0.47]], [[0.47]], [[0.3]], [[0.4]])
 """Leaf reflectance and transmittance, bark and soil for which errors are told in the facts."""
@@ -52,7 +51,7 @@ def main(snakemake):
         "remainder_bound_bright": remainder_bound(coefficients, *BRIGHT).item(),
         "seconds": seconds,
         "paths_per_s": window.n_pixels * coefficients.n_paths / seconds,
-        "peak_rss_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        "peak_rss_mb": peak_rss_mb(),
     }
     json.write(snakemake.output.facts, facts)
     print(facts)

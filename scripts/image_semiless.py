@@ -1,6 +1,5 @@
 """Fit the terms of Semi-LESS to images of reference leaves and soils."""
 
-import resource
 import time
 
 import numpy as np
@@ -8,7 +7,7 @@ import numpy as np
 from dapple.formats import json
 from dapple.retrieval import coefficient_files as files
 from dapple.retrieval import semiless
-from dapple.workflow import options, run
+from dapple.workflow import options, peak_rss_mb, run
 
 
 def main(snakemake):
@@ -26,7 +25,7 @@ def main(snakemake):
     )
     facts = {
         "seconds": time.perf_counter() - started,
-        "peak_rss_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        "peak_rss_mb": peak_rss_mb(),
     }
     files.write_semiless(snakemake.output.semiless, fitted)
     json.write(snakemake.output.facts, facts)

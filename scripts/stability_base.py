@@ -1,4 +1,4 @@
-"""Grow a world, scan it and run all methods undisturbed: what batches share."""
+"""Grow a world, scan it and run all reconstructions undisturbed: what batches share."""
 
 from dapple import engine
 from dapple.formats import clouds, json, meshes, shots, tables
@@ -15,7 +15,9 @@ def main(snakemake):
     chain = Chain(Setup(**params.setup), params.seed)
     level = Level(0.0, "undisturbed", {})
     nothing = Stressor("undisturbed", "undisturbed", (level,), 0.0)
-    rows = outcome.rows(chain, nothing, level, int(snakemake.wildcards.world), params.methods)
+    rows = outcome.rows(
+        chain, nothing, level, int(snakemake.wildcards.world), params.reconstructions
+    )
     plant = chain.tree(UNDISTURBED)
     meshes.write_ply(outputs.leaves, plant["leaf"])
     meshes.write_ply(outputs.wood, plant["wood"])

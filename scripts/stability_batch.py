@@ -1,4 +1,4 @@
-"""Run all methods under every level of one stressor in one world."""
+"""Run all reconstructions under every level of one stressor in one world."""
 
 import pandas as pd
 
@@ -28,7 +28,7 @@ def main(snakemake):
     parts = []
     for level in stressor.chosen(params.levels):
         if level.changes:
-            rows = outcome.rows(chain, stressor, level, world, params.methods)
+            rows = outcome.rows(chain, stressor, level, world, params.reconstructions)
             parts.append(outcome.table(rows))
         else:
             undisturbed = tables.read(inputs.undisturbed)

@@ -19,20 +19,39 @@ TOLERANCE, MAX_RAYS = 0.01, 1024
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
     engine.use_threads(snakemake.threads)
-    told = tables.read(inputs.records)
-    told = told[(told["part"] == "reporting") & told["reconstruction"].isin(params.methods)]
-    lit = Lit(inputs, params, told["sensor"].unique())
+    records = tables.read(inputs.records)
+    unseen = records["part"] == "reporting"
+    unseen &= records["reconstruction"].isin(params.reconstructions)
+    records = records[unseen].reset_index(drop=True)
+    labels = records["sensor"].unique()
+    light = {Path(path).stem: netcdf.read(path).sel(sensor=labels) for path in inputs.light}
+    sky, table = netcdf.read(inputs.sky), tables.read(inputs.sensors).set_index("sensor")
+    sensors_m = table.loc[labels, ["x_m", "y_m", "z_m"]].to_numpy()
+    scenes = {name: loaded(name, inputs, params) for name in params.reconstructions}
 
     def moved(error_m, seed):
+        """The records with the light of wrong places."""
         if not error_m:
-            return told
-        there = pd.concat([lit.moved(name, error_m, seed) for name in params.methods])
+            return records
+        options = {
+            "sun_diameter_deg": params.sun_diameter_deg,
+            "aperture_m": params.aperture_m,
+            "max_rays": MAX_RAYS,
+            "tolerance": TOLERANCE,
+            "shift_m": error_m,
+            "seed": seed,
+        }
+        there = [
+            simulated(moved_light(scenes[name], sensors_m, light[name], sky, **options), name)
+            for name in params.reconstructions
+        ]
         print(f"sensors {error_m:g} m off", flush=True)
-        return told.drop(columns="simulated").merge(there, on=["reconstruction", "sensor", "time"])
+        keys = ["reconstruction", "sensor", "time"]
+        return records.drop(columns="simulated").merge(pd.concat(there), on=keys)
 
     found = worse_records.table(
-        told.reset_index(drop=True),
-        pd.concat([simulated(one, name) for name, one in lit.light.items()], ignore_index=True),
+        records,
+        pd.concat([simulated(one, name) for name, one in light.items()], ignore_index=True),
         moved,
         n_levels=params.levels,
         n_seeds=params.seeds,
@@ -41,37 +60,11 @@ def main(snakemake):
     tables.write(snakemake.output.records, found)
 
 
-class Lit:
-    """The light of a run, its scenes and what shines on them."""
-
-    def __init__(self, inputs, params, reporting):
-        self.params, self.sky = params, netcdf.read(inputs.sky)
-        self.light = {
-            Path(path).stem: netcdf.read(path).sel(sensor=reporting) for path in inputs.light
-        }
-        table = tables.read(inputs.sensors).set_index("sensor")
-        self.places_m = table.loc[reporting, ["x_m", "y_m", "z_m"]].to_numpy()
-        self.scenes = {}
-        for name in params.methods:
-            grid = [path for path in inputs.voxels if Path(path).parent.name == name]
-            found = scene_files.read(grid or inputs.leaves, inputs.wood, params.ground_z_m)
-            self.scenes[name] = [traced.load(scene, params.variant) for scene in found]
-
-    def moved(self, name, error_m, seed):
-        """Light of one reconstruction at wrong places, as a table."""
-        there = moved_light(
-            self.scenes[name],
-            self.places_m,
-            self.light[name],
-            self.sky,
-            shift_m=error_m,
-            seed=seed,
-            max_rays=MAX_RAYS,
-            tolerance=TOLERANCE,
-            sun_diameter_deg=self.params.sun_diameter_deg,
-            aperture_m=self.params.aperture_m,
-        )
-        return simulated(there, name)
+def loaded(name, inputs, params):
+    """The scenes of a reconstruction as rays meet them."""
+    grid = [path for path in inputs.voxels if Path(path).parent.name == name]
+    scenes = scene_files.read(grid or inputs.leaves, inputs.wood, params.ground_z_m)
+    return [traced.load(scene, params.variant) for scene in scenes]
 
 
 if __name__ == "__main__":

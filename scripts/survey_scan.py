@@ -4,7 +4,8 @@ import time
 
 from dapple.formats import voxel_grids
 from dapple.streams import stream_seed
-from dapple.structure.voxels import Grid, plant_area_density
+from dapple.structure.voxel_sums import Grid
+from dapple.structure.voxels import plant_area_density
 from dapple.survey import designs, grid_files, hemisphere
 from dapple.survey.hemisphere_scanner import Hemisphere
 from dapple.survey.voxel_status import Reach

@@ -1,37 +1,25 @@
 """Plant area density from shots, misses included."""
 
-import numpy as np
-
+from dapple import steps
 from dapple.formats import clouds, shots, voxel_grids
 from dapple.structure import subvoxel_clumping
-from dapple.structure.returns import kinds_by_place
-from dapple.structure.voxels import Grid, plant_area_density
 from dapple.workflow import options, run
 
 
 def main(snakemake):
-    settings = options(snakemake.params)
-    classified = clouds.read(snakemake.input.classes)
-    kinds = kinds_by_place(
-        classified.xyz_m,
-        classified.attributes["Classification"],
-        voxel_size_m=settings.pop("majority_voxel_m"),
-    )
-    bounds_m = np.array([classified.xyz_m.min(axis=0), classified.xyz_m.max(axis=0)])
+    settings, path = options(snakemake.params), snakemake.input.shots
+    cloud = clouds.read(snakemake.input.classes)
     correction = settings.pop("correction")
-
-    def density_in(size_m):
-        fired = shots.iterate(snakemake.input.shots)
-        return plant_area_density(fired, Grid.around(bounds_m, size_m), kinds=kinds, **settings)
-
-    density = density_in(float(snakemake.wildcards.size))
+    settings["kinds"] = steps.return_kinds(cloud, settings.pop("majority_voxel_m"))
+    size_m = float(snakemake.wildcards.size)
+    density = steps.voxels(shots.iterate(path), cloud, size_m, **settings)
     if correction:
         finer_m = correction.pop("finer_m")
         density = subvoxel_clumping.correct(
             density,
-            density_in(finer_m) if finer_m else None,
-            shots.read(snakemake.input.shots),
-            kinds=kinds,
+            steps.voxels(shots.iterate(path), cloud, finer_m, **settings) if finer_m else None,
+            shots.read(path),
+            kinds=settings["kinds"],
             **correction,
         )
     voxel_grids.write(snakemake.output.voxels, density)

@@ -83,20 +83,20 @@ rule plot_lidar:
         "../../scripts/plot_lidar.py"
 
 
-rule plot_images:
+rule uav_images:
     input:
         trees=plot_file("world/trees.csv"),
         terrain=plot_file("world/terrain.ply"),
         leaves=grown_files("leaves"),
         wood=grown_files("wood"),
-        code=code("plot_images"),
+        code=code("uav_images"),
     output:
         images=plot_file("world/images.tif"),
         summary=plot_file("world/images.json"),
     log:
-        logs("plot_images_{plot}"),
+        logs("uav_images_{plot}"),
     benchmark:
-        benchmarks("plot_images_{plot}")
+        benchmarks("uav_images_{plot}")
     conda:
         "../../envs/dapple.yaml"
     threads: 2
@@ -117,4 +117,4 @@ rule plot_images:
     message:
         said("photograph the {wildcards.plot} plot")
     script:
-        "../../scripts/plot_images.py"
+        "../../scripts/uav_images.py"

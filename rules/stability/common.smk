@@ -5,6 +5,7 @@ Needs   the configuration
 Makes   nothing
 """
 
+from dapple.stability.reconstructions import chosen
 from dapple.stability.stressors import STRESSORS
 
 STABILITY = settings.stability
@@ -22,11 +23,11 @@ STABILITY_LARGE = {"angular_step": 5000, "leaf_size": 5000}
 WORSENED = [name for name in COMPARED if name != "truth"]
 
 STABILITY_STRESSORS = STABILITY.stressors or tuple(STRESSORS)
+STABILITY_RECONSTRUCTIONS = chosen(STABILITY.reconstructions, settings.voxels.sizes_m)
 
 
 def stability_setup():
     """The configured run that stressors disturb, as `stability.world.Setup` takes it."""
-    transport = settings.light.transport
     return {
         "plant": settings.plant.model_dump(),
         "scan": settings.scan.model_dump(),
@@ -35,25 +36,28 @@ def stability_setup():
         "classify": settings.classify.model_dump(),
         "polygons": settings.polygons.model_dump(),
         "voxels": settings.voxels.model_dump(exclude={"sizes_m"}),
+        "sizes_m": settings.voxels.sizes_m,
         "leaves": settings.leaves.model_dump(),
+        "optics": OPTICS,
         "sensors": settings.sensors.grid(),
         "site": SKY["site"],
         "time": dict(settings.time),
         "radiation": {"linke_turbidity": settings.radiation.linke_turbidity},
         "atmosphere": SKY["atmosphere"],
         "ground_z_m": settings.ground_z_m,
+        "fill_range_m": settings.corrections.fill_range_m,
         "light": {
             "variant": f"{VARIANT}_rgb",
-            "sun_diameter_deg": settings.light.sun_diameter_deg,
-            "aperture_m": settings.light.aperture_m,
-            "sky_rays": transport.sky_rays,
-            "paths": transport.paths,
-            "sky_patches": transport.sky_patches,
-            "max_orders": transport.max_orders,
-            "max_shadow_rays": transport.max_shadow_rays,
-            "sun_kernel_deg": transport.sun_kernel_deg,
-            "tolerance": transport.tolerance,
-            "bands": STABILITY.bands,
+            "model": {"bands": STABILITY.bands, **tracing("sky_patches", "max_orders")},
+            "tracing": tracing(
+                "tolerance",
+                "sky_rays",
+                "paths",
+                "max_shadow_rays",
+                "sun_kernel_deg",
+                "sun_diameter_deg",
+                "aperture_m",
+            ),
             "truth_factor": STABILITY.truth_factor,
         },
     }

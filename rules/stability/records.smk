@@ -33,7 +33,7 @@ if WORSENED:
         resources:
             mem_mb=4000,
         params:
-            methods=WORSENED,
+            reconstructions=WORSENED,
             levels=STABILITY.levels,
             seeds=STABILITY.seeds,
             ground_z_m=settings.ground_z_m,

@@ -30,7 +30,7 @@ rule stability_base:
         mem_mb=3000,
     params:
         setup=stability_setup(),
-        methods=STABILITY.reconstructions,
+        reconstructions=STABILITY_RECONSTRUCTIONS,
         seed=stability_seed,
     message:
         said("world {wildcards.world}, undisturbed")
@@ -58,7 +58,7 @@ rule stability_batch:
         mem_mb=stability_memory,
     params:
         setup=stability_setup(),
-        methods=STABILITY.reconstructions,
+        reconstructions=STABILITY_RECONSTRUCTIONS,
         levels=STABILITY.levels,
         seed=stability_seed,
     message:

@@ -1,6 +1,7 @@
 """What Snakemake's rules and scripts need: code dependencies, logs, and errors that read well."""
 
 import ast
+import resource
 import sys
 import traceback
 from collections.abc import Callable
@@ -71,6 +72,11 @@ def run(main: Callable[[Any], None], snakemake: Any) -> None:
         except Exception:
             log.write(traceback.format_exc())
             raise
+
+
+def peak_rss_mb() -> float:
+    """Most memory that this process has held at a time [MB]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def options(params: Any) -> dict[str, Any]:

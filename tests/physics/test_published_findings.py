@@ -13,7 +13,7 @@ from dapple.stability.chain import Chain
 from dapple.stability.stressors import Conditions
 from dapple.stability.world import Setup
 
-METHODS = ("polygons", "voxels_0.2", "voxels_1.0")
+RECONSTRUCTIONS = ("polygons", "voxels_0.2", "voxels_1.0")
 TREE = {
     "height_m": 3.4,
     "crown_base_m": 1.0,
@@ -23,16 +23,16 @@ TREE = {
 }
 LIGHT = {
     "variant": "llvm_ad_rgb",
-    "sky_rays": 2320,
-    "paths": 512,
-    "sky_patches": 145,
-    "max_orders": 4,
-    "max_shadow_rays": 512,
-    "tolerance": 0.0125,
-    "sun_diameter_deg": 0.533,
-    "aperture_m": 0.0,
-    "sun_kernel_deg": 8.0,
-    "bands": 3,
+    "model": {"bands": 3, "sky_patches": 145, "max_orders": 4},
+    "tracing": {
+        "tolerance": 0.0125,
+        "sky_rays": 2320,
+        "paths": 512,
+        "max_shadow_rays": 512,
+        "sun_diameter_deg": 0.533,
+        "aperture_m": 0.0,
+        "sun_kernel_deg": 8.0,
+    },
     "truth_factor": 4,
 }
 
@@ -62,18 +62,18 @@ def world() -> Chain:
 
 
 def agreement(world: Chain, conditions: Conditions) -> dict[str, dict[str, float]]:
-    """Agreement with the true light, and leaf area, by method."""
-    truth, open_sky = world.light("truth", conditions)[0], world.open_sky(conditions)
+    """Agreement with the true light, and leaf area, by reconstruction."""
+    truth, open_sky = world.light("truth", conditions), world.open_sky(conditions)
     return {
-        name: outcome.agreement(world.light(name, conditions)[0].par, truth.par, open_sky)
+        name: outcome.agreement(world.light(name, conditions).par, truth.par, open_sky)
         | {"leaf_area_m2": world.structure(name, conditions).leaf_area_m2}
-        for name in METHODS
+        for name in RECONSTRUCTIONS
     }
 
 
 def test_the_published_order_and_the_published_paradox(world):
     found = agreement(world, Conditions(angular_step_deg=0.11))
-    r = [found[name]["r"] for name in METHODS]
+    r = [found[name]["r"] for name in RECONSTRUCTIONS]
     assert r[0] > r[1] > r[2]
     polygons, voxels = found["polygons"], found["voxels_0.2"]
     assert polygons["leaf_area_m2"] > voxels["leaf_area_m2"]

@@ -7,12 +7,13 @@ import pandas as pd
 import pytest
 import xarray as xr
 
-from dapple.advice import cheapest, refinements
-from dapple.advice.refinements import Effect
+from dapple.advice import cheapest, costs, refinements
+from dapple.advice.costs import Cost
+from dapple.advice.pilot import Effect, Pilot
 from dapple.formats.meshes import Mesh
 from dapple.formats.netcdf import time_coordinate
 from dapple.light import light_model, series
-from dapple.light.light_model import Cost, Effort, Model
+from dapple.light.light_model import Model, Tracing
 from dapple.light.visibility import Sunlit
 from dapple.scene import traced
 from dapple.scene.scene_optics import Optics
@@ -49,12 +50,12 @@ def square(height_m, half_m, x_m=0.0, y_m=0.0):
 
 
 def a_pilot(minutes=(0, 60, 120), finest=None):
-    return refinements.Pilot(
+    return Pilot(
         np.array([[0.0, 0.0, 0.1], [1.0, 0.0, 0.1]]),
         sky_at(list(minutes)),
         OPTICS,
         finest=finest or Model(bands=7, sky_patches=577),
-        effort=Effort(paths=2048, sky_rays=9232, max_shadow_rays=1024),
+        tracing=Tracing(paths=2048, sky_rays=9232, max_shadow_rays=1024),
         repeats=1,
         seed=3,
     )
@@ -133,7 +134,7 @@ def test_under_a_leaf_scattering_and_the_edge_of_its_shade_count():
     assert all(
         by_level[name, getattr(one.finest, name)].rmse_rel == 0 for name in refinements.LEVELS
     )
-    assert all(set(effect.parts) == set(light_model.PARTS) for effect in effects)
+    assert all(set(effect.parts) == set(costs.PARTS) for effect in effects)
     assert all(effect.cost.wall_s > 0 for effect in effects)
     # shade that moves over the sensor is missed by long steps
     steps = refinements.step_effects(one, scene, one.sky, seed=1)

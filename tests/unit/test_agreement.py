@@ -64,3 +64,10 @@ def test_the_table_has_the_columns_that_others_rely_on():
     row = agreement.compare(light(1.0), light(1.0), OPEN_SKY)
     table = agreement.table({"polygons": row})
     assert list(table) == ["reconstruction", "n", "rmse_rel", "bias_rel", "max_abs_z"]
+
+
+def test_an_error_is_relative_to_the_open_sky_of_its_own_time_and_the_night_does_not_count():
+    open_sky = np.array([1000.0, 100.0, 0.0])
+    reference = np.zeros((2, 3))
+    par = np.array([[100.0, 10.0, 5.0], [-100.0, -10.0, 5.0]])
+    assert agreement.rmse_rel(par, reference, open_sky) == pytest.approx(0.1)

@@ -3,16 +3,13 @@
 import inspect
 import json
 from datetime import UTC, datetime
-from typing import get_args
 
 import pytest
 import yaml
 
 from dapple.config import checks, docs
 from dapple.config.settings import Settings, validate
-from dapple.config.stability import Method
 from dapple.errors import InputError, MissingMissesError
-from dapple.stability.reconstructions import METHODS
 
 FILES = sorted(docs.CONFIG.glob("*.yaml"))
 REAL_CLOUD = {
@@ -260,10 +257,11 @@ def test_a_list_that_something_is_taken_from_must_not_be_empty(key):
     assert "at least 1 item" in error.value.expected
 
 
-def test_a_method_of_the_stability_map_that_there_is_not_is_refused_at_once():
-    assert set(get_args(Method)) == set(METHODS) - {"truth"}
-    with pytest.raises(InputError, match=r"stability\.reconstructions\.0: 'foo'"):
+def test_a_reconstruction_of_the_stability_map_that_there_is_not_is_refused_at_once():
+    with pytest.raises(InputError, match=r"stability\.reconstructions`: found `foo`"):
         validate({"stability": {"reconstructions": ["foo"]}})
+    sizes = {"voxels": {"sizes_m": [0.1]}, "reconstructions": ["polygons"]}
+    validate(sizes | {"stability": {"reconstructions": ["voxels_0.1"]}})
 
 
 def test_a_time_that_is_none_is_refused_wherever_one_is_asked_for():

@@ -7,12 +7,13 @@ import pytest
 import xarray as xr
 
 from dapple.formats.clouds import Cloud
-from dapple.formats.meshes import Mesh
+from dapple.formats.meshes import Mesh, empty
 from dapple.formats.shots import Shots
+from dapple.structure import summary
 from dapple.structure.polygons import reconstruct
 from dapple.structure.voxels import CAPPED
 from dapple.verdict import signals, signals_light, signals_scan, signals_structure
-from dapple.verdict.inputs import Evidence, count_points, no_mesh
+from dapple.verdict.run_data import RunData, points_per_polygon
 from dapple.verdict.signal_meanings import ABSENT, OF_RECORDS, SIGNALS
 
 DIMS = ("x", "y", "z")
@@ -201,13 +202,22 @@ def test_without_reflectance_nothing_is_known_of_it():
 def test_points_of_polygons_are_counted_in_the_order_of_their_elements():
     xyz = rng().uniform(0, 0.3, (400, 3))
     polygons = reconstruct(xyz, seed=1)
-    number = count_points(xyz, 0.05)
+    cloud = Cloud(xyz, attributes={"Classification": np.full(400, 4)})
+    number = points_per_polygon(cloud, polygons, 0.05)
     assert len(number) == polygons.n_elements
     assert number.sum() == 400
     lonely = np.floor(xyz / 0.05).astype(int)
     first = np.unique(lonely, axis=0)[0]
     assert number[0] == (lonely == first).all(axis=1).sum()
     assert signals_structure.sparse_share(np.array([1, 2, 3, 9])) == 0.5
+
+
+def test_polygons_of_other_points_have_no_count():
+    xyz = rng().uniform(0, 0.3, (400, 3))
+    cloud = Cloud(xyz, attributes={"Classification": np.full(400, 4)})
+    assert points_per_polygon(cloud, reconstruct(xyz[:20], seed=1), 0.05) is None
+    wood = Cloud(xyz, attributes={"Classification": np.zeros(400)})
+    assert points_per_polygon(wood, empty(), 0.05) is None
 
 
 def flat_leaves(n=200):
@@ -238,7 +248,7 @@ def test_the_share_at_the_cap_is_of_leaf_area():
     grid = voxels(density)
     assert signals_structure.capped_share(grid) == pytest.approx(125 / 225)
     assert signals_structure.plant_area_index(grid) == pytest.approx((1.0 * 20 + 5.0 * 5) / 25)
-    assert signals_structure.leaf_area_m2(grid) == pytest.approx(225 * 0.008)
+    assert summary.voxel_area_m2(grid) == pytest.approx(225 * 0.008)
 
 
 # Light
@@ -289,30 +299,28 @@ def test_sensors_out_of_place_fit_better_elsewhere_half_of_the_time():
 # All together
 
 
-def evidence(**more):
+def a_run(**more):
     xyz = rng().uniform(0, 2, (3000, 3))
     kinds = np.where(np.arange(3000) % 10, 4, 0)
     cloud = Cloud(xyz, attributes={"Classification": kinds})
-    return Evidence(
-        **({"shots": None, "cloud": cloud, "leaves": no_mesh(), "wood": no_mesh()} | more)
-    )
+    return RunData(**({"shots": None, "cloud": cloud, "leaves": empty(), "wood": empty()} | more))
 
 
 def test_every_signal_is_always_there_and_unknown_where_it_must_be():
-    bare = signals.measure(evidence())
+    bare = signals.measure(a_run())
     assert set(bare) == set(SIGNALS)
     assert {name for name, value in bare.items() if math.isfinite(value)} == {"wood_share"}
     named = [name for names, *_ in ABSENT.values() for name in names]
     assert set(named) | set(OF_RECORDS) <= set(SIGNALS)
 
 
-def test_the_same_evidence_gives_the_same_signals():
-    cloud = evidence().cloud
+def test_the_same_run_gives_the_same_signals():
+    cloud = a_run().cloud
     leaves = reconstruct(cloud.xyz_m[cloud.attributes["Classification"] == 4], seed=1)
     par = rng().uniform(0, 1000, (6, 12))
-    whole = evidence(
+    full = a_run(
         leaves=leaves,
-        points_per_polygon=count_points(cloud.xyz_m, 0.05)[: leaves.n_elements],
+        points_per_polygon=points_per_polygon(cloud, leaves, 0.05),
         shots=shots_from(around(0, 120, 240), cloud.xyz_m[:500], None),
         voxels={
             "voxels_1.0": voxels(np.ones((2, 2, 2)), size=1.0),
@@ -323,12 +331,12 @@ def test_the_same_evidence_gives_the_same_signals():
             "voxels_0.2": light(0.9 * par),
             "voxels_1.0": light(par[::-1]),
         },
-        shifted_light={"polygons": light(1.1 * par)},
+        moved_light={"polygons": light(1.1 * par)},
         sensors_m=rng().uniform(0, 2, (6, 3)) * [1, 1, 0],
         sun_zenith_deg=np.linspace(30, 60, 12),
         sun_azimuth_deg=np.linspace(150, 250, 12),
     )
-    first, again = signals.measure(whole), signals.measure(whole)
+    first, again = signals.measure(full), signals.measure(full)
     assert first == pytest.approx(again, nan_ok=True, abs=0)
     assert first["r_polygons_fine"] == pytest.approx(1)
     assert first["area_fine_to_coarse"] == pytest.approx(0)

@@ -6,7 +6,7 @@ import pytest
 
 from dapple.errors import InputError
 from dapple.figures import stability_map
-from dapple.stability import outcome, thresholds
+from dapple.stability import outcome, reconstructions, thresholds
 
 
 def runs(values: dict, stressor="wind", reconstruction="polygons", harmless=0.0, seeds=3):
@@ -54,10 +54,20 @@ def test_constant_light_has_no_correlation():
     assert np.isnan(outcome.agreement(np.full((5, 4), 3.0), truth, np.full(4, 1000.0))["r"])
 
 
-def test_a_method_that_there_is_not_is_named():
+def test_a_reconstruction_that_there_is_not_is_named():
     with pytest.raises(InputError, match="voxels_9"):
-        outcome.methods(["voxels_9"])
-    assert "truth" not in outcome.methods()
+        reconstructions.chosen(["voxels_9"], (0.2, 1.0))
+    assert "truth" not in reconstructions.chosen([], (0.2, 1.0))
+
+
+def test_voxels_are_rebuilt_in_the_sizes_that_are_configured():
+    assert reconstructions.chosen([], (0.1,)) == [
+        "polygons",
+        "voxels_0.1",
+        "virtual_leaves",
+        "polygons_corrected",
+        "voxels_0.1_corrected",
+    ]
 
 
 def test_a_method_fails_at_the_first_level_that_costs_five_hundredths_of_r():

@@ -8,6 +8,7 @@ import pytest
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
 from dapple.formats.shots import Shots
+from dapple.light.moved_sensors import sideways
 from dapple.sky.sun import position
 from dapple.stability import stressors, world
 from dapple.stability.chain import Chain, true_conditions
@@ -208,7 +209,7 @@ def test_an_arc_of_positions_lies_on_one_side():
 
 def test_sensors_are_wrong_by_the_distance_that_is_asked_for_and_level():
     places = world.sensors_m(SETUP, UNDISTURBED)
-    wrong = world.misplaced(places, 0.2, seed=1)
+    wrong = sideways(places, 0.2, seed=1)
     assert np.linalg.norm(wrong - places, axis=1) == pytest.approx(0.2)
     assert np.array_equal(wrong[:, 2], places[:, 2])
 

@@ -8,7 +8,8 @@ from dapple.errors import InputError
 from dapple.formats.shots import Shots
 from dapple.structure import subvoxel_clumping
 from dapple.structure.subvoxel_clumping import DENSITY, effective_density
-from dapple.structure.voxels import Grid, plant_area_density
+from dapple.structure.voxel_sums import Grid
+from dapple.structure.voxels import plant_area_density
 
 U, G = 3.0, 0.5
 DIMS = ("x", "y", "z")

@@ -54,13 +54,6 @@ def test_the_table_lists_the_cheapest_first_and_begins_as_others_rely_on():
     assert list(table["on_front"]) == [True, True, False]
 
 
-def test_an_error_is_relative_to_the_open_sky_of_its_own_time_and_the_night_does_not_count():
-    open_sky = np.array([1000.0, 100.0, 0.0])
-    reference = np.zeros((2, 3))
-    par = np.array([[100.0, 10.0, 5.0], [-100.0, -10.0, 5.0]])
-    assert tradeoff.rmse_rel(par, reference, open_sky) == pytest.approx(0.1)
-
-
 @pytest.fixture
 def points():
     rows = [row(10.0**k, 0.3 / 2**k, paths=4**k) for k in range(4)]

@@ -10,7 +10,8 @@ from dapple.formats.meshes import Mesh
 from dapple.formats.shots import Shots
 from dapple.structure import leaf_angles, summary
 from dapple.structure.returns import kinds_by_place
-from dapple.structure.voxels import Grid, accumulate, estimate, plant_area_density
+from dapple.structure.voxel_sums import Grid, accumulate
+from dapple.structure.voxels import estimate, plant_area_density
 
 
 def shots_of(origin, direction, ranges):

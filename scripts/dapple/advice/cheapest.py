@@ -6,8 +6,9 @@ from itertools import product
 
 import numpy as np
 
-from dapple.advice.refinements import Effect
-from dapple.light.light_model import PARTS, Cost, Model
+from dapple.advice.costs import PARTS, Cost
+from dapple.advice.pilot import Effect
+from dapple.light.light_model import Model
 
 SAVES = {
     "sun": ("direct",),
@@ -22,7 +23,7 @@ LEAST_SAVING = 0.1
 
 
 @dataclass(frozen=True)
-class Choice:
+class Cheapest:
     """The cheapest model within the tolerance.
 
     Attributes
@@ -92,7 +93,7 @@ def choose(
     tolerance: float,
     scale: Scale,
     measure: Callable[[Model], float],
-) -> Choice:
+) -> Cheapest:
     """The cheapest model whose left-out effects add up to no more than the tolerance.
 
     Of models that cost nearly the same the one that leaves out least is taken.
@@ -114,7 +115,7 @@ def choose(
 
     Returns
     -------
-    Choice
+    Cheapest
     """
     options = {
         name: {
@@ -141,5 +142,5 @@ def choose(
         steps = options.get("step_min", {}).get(model.step_min, 0.0)
         measured = float(np.hypot(measure(model), steps))
         if measured <= tolerance or model == finest:
-            return Choice(model, left_out, measured)
-    return Choice(finest, 0.0, 0.0)
+            return Cheapest(model, left_out, measured)
+    return Cheapest(finest, 0.0, 0.0)

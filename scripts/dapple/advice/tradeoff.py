@@ -27,21 +27,6 @@ PUBLISHED_S = {"polygons": 5.5, "voxels_1.0": 7.8, "voxels_0.2": 217.0}
 """Seconds of one LESS run, one sensor at one time, on another machine: Frey et al. (2025)."""
 
 
-def rmse_rel(par: np.ndarray, reference: np.ndarray, open_sky: np.ndarray) -> float:
-    """Root mean square difference as a share of open-sky PAR.
-
-    Parameters
-    ----------
-    par, reference : (n, t) float64
-        PAR at n sensors and t times.
-    open_sky : (t,) float64
-        PAR without a tree in the same unit; times without light are left out.
-    """
-    lit = open_sky > 0
-    relative = (par[:, lit] - reference[:, lit]) / open_sky[lit]
-    return float(np.sqrt((relative**2).mean()))
-
-
 def front(cost: Sequence[float], error: Sequence[float]) -> np.ndarray:
     """Points that no other beats: none is both at most as dear and at most as wrong (Pareto).
 

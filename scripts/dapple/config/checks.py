@@ -13,6 +13,7 @@ from dapple import clock
 from dapple.config.chlorophyll import GridRange
 from dapple.errors import InputError, MissingMissesError
 from dapple.stability import stressors
+from dapple.stability.reconstructions import chosen
 from dapple.survey import designs
 from dapple.survey.hemisphere_scanner import Hemisphere
 from dapple.timezones import find_timezone
@@ -325,9 +326,11 @@ def chlorophyll(settings: Settings, where: str) -> None:
 
 
 def stability(settings: Settings, where: str) -> None:
-    """What is to be made worse is known."""
+    """What is to be made worse, and what is to be rebuilt, is known."""
     for name in settings.stability.stressors:
         stressors.find(name, where)
+    wanted, key = settings.stability.reconstructions, f"{where}, `stability.reconstructions`"
+    chosen(wanted, settings.voxels.sizes_m, key)
 
 
 CHECKS = (

@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated
 
-from dapple.config.base import FREY, Count, LeafAngles, NotNegative, Positive, Section, Some, key
+from dapple.config.base import (
+    FREY,
+    Count,
+    LeafAngles,
+    NotNegative,
+    OneOf,
+    Positive,
+    Section,
+    Some,
+    key,
+)
+from dapple.structure.pad_estimators import ESTIMATORS
 
 
 class Voxels(Section):
     """Plant area density."""
 
     sizes_m: Some[Positive] = key((0.2, 1.0), "edges of the voxels", FREY)
-    estimator: Literal["transmittance", "ppl", "fpl", "fpl_biased", "contact_frequency"] = key(
-        "fpl", "bias-corrected free path length", "Pimont et al. 2018"
+    estimator: Annotated[str, OneOf(ESTIMATORS)] = key(
+        "fpl",
+        ", ".join(f"{name}: {one.summary}" for name, one in ESTIMATORS.items()),
+        "Pimont et al. 2018",
     )
     leaf_angle_distribution: LeafAngles = key("spherical", "of the leaf normals", FREY)
     single_leaf_area_m2: NotNegative = key(

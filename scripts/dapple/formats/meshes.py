@@ -76,6 +76,11 @@ class Mesh:
         return float(self.triangle_area_m2.sum())
 
 
+def empty() -> Mesh:
+    """A mesh without any element."""
+    return Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32), np.zeros(0, np.int32))
+
+
 def concatenate(meshes: list[Mesh]) -> Mesh:
     """Put meshes together; elements keep their order and are renumbered."""
     vertex_shift = np.cumsum([0] + [len(mesh.vertices_m) for mesh in meshes])

@@ -1,25 +1,19 @@
-"""Light of one scene as finely or as coarsely as a model says, and what it costs to compute."""
+"""How finely light is computed: what is kept of sun, sky and spectra, and with how many rays."""
 
-import time
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from dapple.formats.netcdf import times
-from dapple.light import series, transport, visibility
-from dapple.light.series import Light
 from dapple.light.visibility import Sunlit
 from dapple.scene.scene_optics import Optics, group_bands, group_flux
 from dapple.scene.surfaces import GROUND
-from dapple.scene.traced import TracedScene
-from dapple.streams import stream_seed
 
 FLUXES = ("beam_normal_umol_m2_s", "diffuse_horizontal_umol_m2_s")
-PARTS = ("direct", "paths", "products")
-"""Steps of the computation: shadow rays, counted paths, products with skies and spectra."""
+DIRECT_SHARE, PATH_SHARE = 0.8, 0.35
+"""How a tolerance is shared out between shadow rays and paths, with a margin: the real sky is not
+the nominal one by which the number of paths is judged."""
 
 
 @dataclass(frozen=True)
@@ -57,61 +51,52 @@ class Model:
 
 
 @dataclass(frozen=True)
-class Effort:
-    """How many rays are traced, whatever the model.
+class Tracing:
+    """How many rays are traced, whatever the model, and what of.
 
     Attributes
     ----------
     paths, sky_rays : int
-        Paths and straight rays to the sky of every sensor.
-    shadow_tolerance : float
-        Standard error of the sun's visible share at which shadow rays are enough.
+        Paths and straight rays to the sky of every sensor at first.
     max_shadow_rays : int
         Most shadow rays of a sensor at a time.
+    tolerance : float
+        Standard error of light that is enough, as a share of the open sky's.
+    max_growth : float
+        Rays to the sky and paths grow up to so many times until this error is reached; 1: they
+        stay as many as they are.
     sun_diameter_deg, aperture_m, sun_kernel_deg : float
-        As in `direct.sunlit` and `transport.sun_radiance`.
+        As in `visibility.sunlit` and `tensor.sun_radiance`.
     """
 
     paths: int = 16_384
     sky_rays: int = 16_384
-    shadow_tolerance: float = 0.004
     max_shadow_rays: int = 16_384
+    tolerance: float = 0.005
+    max_growth: float = 1.0
     sun_diameter_deg: float = 0.533
     aperture_m: float = 0.0
     sun_kernel_deg: float = 8.0
 
+    @property
+    def sun_tolerance(self) -> float:
+        """Standard error of the sun's visible share at which shadow rays are enough."""
+        return DIRECT_SHARE * self.tolerance
 
-@dataclass(frozen=True)
-class Cost:
-    """Seconds on the clock and seconds of all processors together."""
+    @property
+    def path_tolerance(self) -> float | None:
+        """Standard error of sky and scattered light at which paths are enough; None: any is."""
+        return PATH_SHARE * self.tolerance if self.max_growth > 1 else None
 
-    wall_s: float = 0.0
-    cpu_s: float = 0.0
-
-    def __add__(self, other: "Cost") -> "Cost":
-        return Cost(self.wall_s + other.wall_s, self.cpu_s + other.cpu_s)
-
-    def __mul__(self, factor: float) -> "Cost":
-        return Cost(self.wall_s * factor, self.cpu_s * factor)
-
-
-def spread(n: int, count: int) -> np.ndarray:
-    """Indices of `count` of n things, evenly spread; all of them where there are fewer."""
-    if count >= n:
-        return np.arange(n)
-    return np.unique(np.linspace(0, n - 1, count + 2)[1:-1].round().astype(int))
-
-
-def least(costs: list[Cost]) -> Cost:
-    """The least wall time and the least processor time of several runs of one thing."""
-    return Cost(min(c.wall_s for c in costs), min(c.cpu_s for c in costs))
-
-
-def timed(work: Callable[[], Any]) -> tuple[Any, Cost]:
-    """Do some work and say what it cost."""
-    wall, cpu = time.perf_counter(), time.process_time()
-    found = work()
-    return found, Cost(time.perf_counter() - wall, time.process_time() - cpu)
+    def finer(self, factor: int) -> "Tracing":
+        """With so many times as many rays, and the error that goes with them."""
+        return replace(
+            self,
+            paths=self.paths * factor,
+            sky_rays=self.sky_rays * factor,
+            max_shadow_rays=self.max_shadow_rays * factor,
+            tolerance=self.tolerance / np.sqrt(factor),
+        )
 
 
 def simplified(sky: xr.Dataset, optics: Optics, model: Model) -> tuple[xr.Dataset, Optics]:
@@ -147,31 +132,6 @@ def simplified(sky: xr.Dataset, optics: Optics, model: Model) -> tuple[xr.Datase
     return sky, optics
 
 
-def sunlit(
-    scene: TracedScene, sensors_m: np.ndarray, sky: xr.Dataset, model: Model, **options: Any
-) -> Sunlit:
-    """What sensors see of the sun at the times of a sky, traced as often as a model wants.
-
-    Parameters
-    ----------
-    scene : TracedScene
-    sensors_m : (n, 3) float64
-        Local frame [m].
-    sky : xarray.Dataset
-        For its times and suns.
-    model : Model
-        Sun and time step count.
-    **options
-        Of `direct.sunlit`; the diameter of the sun is that of the disc.
-    """
-    minutes = (times(sky) - times(sky)[0]).total_seconds().to_numpy() / 60
-    chosen = thinned(minutes, model.step_min)
-    if model.sun == "point":
-        options = options | {"sun_diameter_deg": 0.0}
-    seen = visibility.sunlit(scene, sensors_m, series.towards_sun(sky)[chosen], **options)
-    return interpolated(seen, minutes[chosen], minutes) if len(chosen) < len(minutes) else seen
-
-
 def thinned(minutes: np.ndarray, step_min: float) -> np.ndarray:
     """Indices of times at least `step_min` apart, the first and the last among them."""
     chosen = [0]
@@ -198,63 +158,3 @@ def interpolated(seen: Sunlit, known: np.ndarray, wanted: np.ndarray) -> Sunlit:
         return values[..., before] * (1 - part) + values[..., before + 1] * part
 
     return Sunlit(between(seen.share), between(seen.standard_error), seen.n_rays[:, before])
-
-
-def light(
-    scene: TracedScene,
-    sensors_m: np.ndarray,
-    sky: xr.Dataset,
-    optics: Optics,
-    model: Model,
-    effort: Effort,
-    *,
-    seed: int,
-) -> tuple[Light, dict[str, Cost]]:
-    """Light of a scene by the transport engine, and the cost of each of its `PARTS`.
-
-    The same seed gives models that share rays the same random numbers: what differs is the model.
-
-    Parameters
-    ----------
-    scene : TracedScene
-    sensors_m : (n, 3) float64
-        Local frame [m].
-    sky : xarray.Dataset
-        Sun and sky at t times.
-    optics : Optics
-    model : Model
-    effort : Effort
-    seed : int
-    """
-    plain_sky, plain_optics = simplified(sky, optics, model)
-    seen, direct_cost = timed(
-        lambda: sunlit(
-            scene,
-            sensors_m,
-            sky,
-            model,
-            tolerance=effort.shadow_tolerance,
-            max_rays=effort.max_shadow_rays,
-            seed=stream_seed(seed, "sun"),
-            sun_diameter_deg=effort.sun_diameter_deg,
-            aperture_m=effort.aperture_m,
-        )
-    )
-    counted, paths_cost = timed(
-        lambda: transport.collect(
-            scene,
-            sensors_m,
-            n_paths=effort.paths,
-            n_sky_rays=effort.sky_rays,
-            n_patches=model.sky_patches,
-            max_orders=model.max_orders,
-            aperture_m=effort.aperture_m,
-            seed=stream_seed(seed, "paths"),
-        )
-    )
-    found, products_cost = timed(
-        lambda: series.compute(
-            seen, counted, plain_sky, plain_optics, sun_kernel_deg=effort.sun_kernel_deg
-        )
-    )
-    return found, dict(zip(PARTS, (direct_cost, paths_cost, products_cost), strict=True))

@@ -10,6 +10,13 @@ from dapple.light.series import level_beam, towards_sun
 from dapple.scene.traced import TracedScene
 
 
+def sideways(places_m: np.ndarray, distance_m: float, seed: int) -> np.ndarray:
+    """Places (s, 3), each moved level by a distance in a direction of its own [m]."""
+    azimuth = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(places_m))
+    way = np.stack([np.sin(azimuth), np.cos(azimuth), np.zeros_like(azimuth)], axis=1)
+    return places_m + distance_m * way
+
+
 def moved_light(
     scenes: Iterable[TracedScene],
     sensors_m: np.ndarray,
@@ -49,9 +56,7 @@ def moved_light(
     Dataset
         Like `light`.
     """
-    azimuth = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(sensors_m))
-    way = np.stack([np.sin(azimuth), np.cos(azimuth), np.zeros_like(azimuth)], axis=1)
-    places = np.concatenate([sensors_m, sensors_m + shift_m * way])
+    places = np.concatenate([sensors_m, sideways(sensors_m, shift_m, seed)])
     shares = [
         visibility.sunlit(
             scene,

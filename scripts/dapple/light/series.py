@@ -1,12 +1,13 @@
 """PAR through the day from what was traced once: direct, sky and scattered light added up."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
-from dapple.formats.netcdf import time_coordinate, times
+from dapple.formats.netcdf import time_coordinate
 from dapple.frames import direction_from_angles
 from dapple.light.tensor import Transport, straight, summed_scattered, sun_radiance
 from dapple.light.visibility import Sunlit
@@ -23,10 +24,6 @@ PARTS = {
     "par_scattered_umol_m2_s": "PAR scattered by leaves, bark and ground",
     "standard_error_umol_m2_s": "standard error of PAR",
 }
-
-DIRECT_SHARE, PATH_SHARE = 0.8, 0.35
-"""How a tolerance is shared out between shadow rays and paths, with a margin: the real sky is not
-the nominal one by which the number of paths is judged."""
 
 
 def towards_sun(sky: xr.Dataset) -> np.ndarray:
@@ -140,40 +137,25 @@ def _from_sky(
     return from_sky.mean(axis=1), scattered.mean(axis=1), variance
 
 
-def summarise(placements: list[Light], sensors: list[str], sky: xr.Dataset) -> xr.Dataset:
-    """Mean and standard error over placements of leaves.
+def mean(placements: Sequence[Light]) -> Light:
+    """Mean over placements of virtual leaves, or the light itself where there is one.
 
-    Parameters
-    ----------
-    placements : list of Light
-        One for each placement of virtual leaves, a single one where leaves are real.
-    sensors : list of str
-        Labels.
-    sky : xarray.Dataset
-        For its times.
-
-    Returns
-    -------
-    xarray.Dataset
-        The light series. With several placements the standard error is that of their mean, which
-        includes that of the paths.
+    The standard error of several is that of their mean, which includes that of the paths.
     """
-    error = placements[0].standard_error
-    if len(placements) > 1:
-        error = np.std([p.par for p in placements], axis=0, ddof=1) / np.sqrt(len(placements))
-    direct, from_sky, scattered = (
+    if len(placements) == 1:
+        return placements[0]
+    parts = (
         np.mean([getattr(p, part) for p in placements], axis=0)
         for part in ("direct", "sky", "scattered")
     )
-    return dataset(
-        sensors,
-        times(sky),
-        par=direct + from_sky + scattered,
-        direct=direct,
-        sky=from_sky,
-        scattered=scattered,
-        standard_error=error,
-    )
+    spread = np.std([p.par for p in placements], axis=0, ddof=1)
+    return Light(*parts, standard_error=spread / np.sqrt(len(placements)))
+
+
+def as_dataset(light: Light, sensors: Sequence[str], when: pd.DatetimeIndex) -> xr.Dataset:
+    """Light of labelled sensors at t times as files have it."""
+    parts = {name: getattr(light, name) for name in ("direct", "sky", "scattered")}
+    return dataset(list(sensors), when, par=light.par, standard_error=light.standard_error, **parts)
 
 
 def dataset(

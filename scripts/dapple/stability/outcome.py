@@ -1,24 +1,24 @@
 """How a run came out: agreement of light with the true world, leaf area, classes, time."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
-import xarray as xr
 
-from dapple.advice.tradeoff import rmse_rel
+from dapple.cloud.scores import scores
 from dapple.errors import InputError
-from dapple.formats.clouds import LEAF
+from dapple.formats.meshes import empty
 from dapple.formats.netcdf import times
 from dapple.light import series
 from dapple.light.series import Light
-from dapple.stability.chain import SHIFT_M, Chain, f1_of, true_conditions
-from dapple.stability.reconstructions import METHODS, size_of
+from dapple.stability.chain import Chain, true_conditions
 from dapple.stability.stressors import Conditions, Level, Stressor
+from dapple.stats.agreement import rmse_rel
 from dapple.streams import stream_seed
+from dapple.structure.voxel_sizes import name_of
 from dapple.verdict import signals
-from dapple.verdict.inputs import Evidence, count_points, no_mesh
+from dapple.verdict.run_data import RunData, points_per_polygon, with_light
 from dapple.virtual.sensor_model import simulate
 
 COLUMNS = [
@@ -74,9 +74,9 @@ def agreement(par: np.ndarray, truth: np.ndarray, open_sky: np.ndarray) -> dict[
 
 
 def rows(
-    chain: Chain, stressor: Stressor, level: Level, seed: int, wanted: Iterable[str]
+    chain: Chain, stressor: Stressor, level: Level, seed: int, reconstructions: Sequence[str]
 ) -> list[dict[str, Any]]:
-    """Run all methods under one degree of a stressor.
+    """Run all reconstructions under one degree of a stressor.
 
     Parameters
     ----------
@@ -86,16 +86,16 @@ def rows(
         What is made worse, how much.
     seed : int
         Number of the world, for the table.
-    wanted : iterable of str
-        Methods, as in `methods`.
+    reconstructions : sequence of str
+        Their names, of `reconstructions.names`.
 
     Returns
     -------
     list of dict
-        One row a method. One that cannot run says why in `failed`, and its r is NaN.
+        One row a reconstruction. One that cannot be made says why in `failed`, and its r is NaN.
     """
     conditions = level.conditions
-    truth = chain.light("truth", conditions)[0]
+    truth = chain.light("truth", conditions)
     true_area_m2 = chain.structure("truth", conditions).leaf_area_m2
     open_sky = chain.open_sky(conditions)
     head = {
@@ -105,92 +105,93 @@ def rows(
         "label": level.label,
         "harmless": level.value == stressor.harmless,
     }
-    classes = _tried(lambda: chain.classifiers(conditions) | f1_of(chain.classes(conditions)))
-    head |= classes if isinstance(classes, dict) else {}
+    scored = _tried(lambda: class_scores(chain, conditions))
+    head |= scored if isinstance(scored, dict) else {}
     found, light = [], {}
-    for name in methods(wanted):
+    for name in reconstructions:
         row = head | {"reconstruction": name, "failed": ""}
-        lit = _tried(lambda n=name: chain.light(n, conditions))
-        if isinstance(lit, InputError):
-            row["failed"] = str(lit)
+        own = _tried(lambda n=name: chain.light(n, conditions))
+        if isinstance(own, InputError):
+            row["failed"] = str(own)
         else:
-            light[name] = lit
+            light[name] = own
             area_m2 = chain.structure(name, conditions).leaf_area_m2
-            row |= agreement(lit[0].par, truth.par, open_sky)
+            row |= agreement(own.par, truth.par, open_sky)
             row |= {
                 "leaf_area_m2": area_m2,
                 "leaf_area_bias": area_m2 / true_area_m2 - 1,
                 "wall_s": chain.seconds_of(name),
             }
         found.append(row)
-    seen = _signals(chain, conditions, light, truth)
-    return [row | seen for row in found]
+    # None where there is not even a classified cloud.
+    seen = _tried(lambda: signals.measure(run_data(chain, conditions, light, truth)))
+    return [row | (seen if isinstance(seen, dict) else {}) for row in found]
 
 
-def _signals(
-    chain: Chain, conditions: Conditions, light: dict[str, tuple[Light, Light]], truth: Light
-) -> dict[str, float]:
-    """Signals that need no truth; none where there is not even a classified cloud."""
-    found = _tried(lambda: signals.measure(evidence(chain, conditions, light, truth)))
-    return found if isinstance(found, dict) else {}
+def class_scores(chain: Chain, conditions: Conditions) -> dict[str, float]:
+    """F1 of leaf and wood: of the classes in use, by a threshold of reflectance, by geometry."""
+    clouds = {
+        "": chain.classes(conditions),
+        "_threshold": chain.classified(conditions, "reflectance"),
+        "_geometry": chain.classified(conditions, "geometry"),
+    }
+    found = {}
+    for suffix, cloud in clouds.items():
+        scored = scores(cloud.attributes["Classification"], cloud.attributes["TrueClass"])
+        found |= {f"f1_{kind}{suffix}": scored[kind]["f1"] for kind in ("leaf", "wood")}
+    return found
 
 
-def evidence(
-    chain: Chain, conditions: Conditions, light: dict[str, tuple[Light, Light]], truth: Light
-) -> Evidence:
+def run_data(
+    chain: Chain, conditions: Conditions, light: dict[str, Light], truth: Light
+) -> RunData:
     """What a run leaves behind for a verdict: no truth in it but what PAR sensors recorded.
 
     Parameters
     ----------
     chain : Chain
     conditions : Conditions
-    light : dict of str to (Light, Light)
-        Of the methods that came through, as `Chain.light` gives it.
+    light : dict of str to Light
+        Of the reconstructions that came through.
     truth : Light
         What sensors record, with the noise of an ordinary sensor and by the right clock.
     """
     cloud = chain.classes(conditions)
-    leaves_m = cloud.xyz_m[cloud.attributes["Classification"] == LEAF]
     meshes = _tried(lambda: chain.polygons(conditions))
-    has_polygons = isinstance(meshes, dict)
-    meshes = meshes if has_polygons else {"leaf": no_mesh(), "wood": no_mesh()}
-    true_sky = chain.sky(true_conditions(conditions))[0]
-    sky, places_m = chain.sky(conditions)[0], chain.sensors_m(conditions)
-    records = simulate(_dataset(truth, true_sky), seed=stream_seed(chain.seed, "records"))
-    records["time"] = records["time"].dt.tz_localize(None)  # as in datasets
-    records = records.set_index(["sensor", "time"])["par_umol_m2_s"].to_xarray()
+    if isinstance(meshes, InputError):
+        meshes = {"leaf": empty(), "wood": empty()}
     voxels = {
-        name: _tried(lambda n=name: chain.voxels(conditions, size_of(n)))
-        for name in METHODS
-        if name.startswith("voxels_") and not name.endswith("_corrected")
+        name_of(size_m): _tried(lambda m=size_m: chain.voxels(conditions, m))
+        for size_m in chain.setup.sizes_m
     }
-    edge_m = chain.setup.polygons["voxel_size_m"] * conditions.voxel_factor
-    return Evidence(
+    run = RunData(
         shots=chain.shots(conditions),
         cloud=cloud,
         leaves=meshes["leaf"],
         wood=meshes["wood"],
-        points_per_polygon=count_points(leaves_m, edge_m) if has_polygons else None,
+        points_per_polygon=points_per_polygon(
+            cloud, meshes["leaf"], chain.polygon_size_m(conditions)
+        ),
         voxels={n: grid for n, grid in voxels.items() if not isinstance(grid, InputError)},
-        light={name: _dataset(pair[0], true_sky) for name, pair in light.items()},
-        shifted_light={name: _dataset(pair[1], true_sky) for name, pair in light.items()},
-        sensors_m=places_m,
-        sun_zenith_deg=sky["sun_zenith_deg"].to_numpy(),
-        sun_azimuth_deg=sky["sun_azimuth_deg"].to_numpy(),
-        shift_m=SHIFT_M,
-        measured_umol_m2_s=records,
     )
-
-
-def _dataset(light: Light, sky: xr.Dataset) -> xr.Dataset:
-    """Light as the files of a run have it, stamped by the clock that is believed."""
-    parts = {name: getattr(light, name) for name in ("direct", "sky", "scattered")}
-    return series.dataset(
-        [str(number) for number in range(len(light.par))],
-        times(sky),
-        par=light.par,
-        standard_error=light.standard_error,
-        **parts,
+    # Records and light are stamped by the clock that is believed.
+    stamps, sensors_m = times(chain.sky(true_conditions(conditions))), chain.sensors_m(conditions)
+    labels = [str(number) for number in range(len(sensors_m))]
+    recorded = simulate(
+        series.as_dataset(truth, labels, stamps), seed=stream_seed(chain.seed, "records")
+    )
+    recorded["time"] = recorded["time"].dt.tz_localize(None)  # as in datasets
+    tracing = chain.setup.light["tracing"]
+    return with_light(
+        run,
+        {name: series.as_dataset(own, labels, stamps) for name, own in light.items()},
+        lambda name: chain.loaded(name, conditions),
+        sensors_m=sensors_m,
+        sky=chain.sky(conditions),
+        measured_umol_m2_s=recorded.set_index(["sensor", "time"])["par_umol_m2_s"].to_xarray(),
+        sun_diameter_deg=tracing["sun_diameter_deg"],
+        aperture_m=tracing["aperture_m"],
+        seed=stream_seed(chain.seed, "shift"),
     )
 
 
@@ -207,22 +208,3 @@ def table(found: list[dict[str, Any]]) -> pd.DataFrame:
     frame = pd.DataFrame(found)
     first = [name for name in COLUMNS if name in frame or name == "flagged"]
     return frame.reindex(columns=[*first, *(n for n in frame.columns if n not in first)])
-
-
-def methods(wanted: Iterable[str] = ()) -> list[str]:
-    """Names of the methods that are wanted; empty: of all, the truth left out.
-
-    Raises
-    ------
-    InputError
-        A method that there is not.
-    """
-    known = [name for name in METHODS if name != "truth"]
-    if unknown := set(wanted) - set(known):
-        raise InputError(
-            "stability.reconstructions",
-            ", ".join(sorted(unknown)),
-            f"some of {', '.join(known)}",
-            "Choose among these.",
-        )
-    return list(wanted) or known

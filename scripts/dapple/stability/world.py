@@ -1,6 +1,6 @@
 """Worlds for the stability map: a tree, its needles and neighbours, wind, scans, sensors, skies."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
 from typing import Any
@@ -36,14 +36,19 @@ class Setup:
     ----------
     plant, scan, clean, classify, polygons, voxels, leaves : dict
         As the rules of the same names pass them on.
+    sizes_m : sequence of float
+        Edges of the voxels [m].
+    optics : dict
+        As rule `optics` passes it on.
     sensors : dict
         `columns`, `rows`, `spacing_m`, `height_m`.
     site, time, radiation, atmosphere : dict
         As rule `sky` passes them on.
     light : dict
-        `sky_rays`, `paths`, `sky_patches`, `max_orders`, `bands`, `max_shadow_rays`,
-        `tolerance`, `sun_diameter_deg`, `aperture_m`, `sun_kernel_deg`, `variant` and
+        `model` and `tracing`, keyword arguments of `light_model.Model` and `Tracing`; `variant` and
         `truth_factor`, how many times more rays the truth gets.
+    fill_range_m : float
+        As in the section `corrections` [m].
     ground_z_m : float
         Height of the ground [m].
     """
@@ -61,6 +66,9 @@ class Setup:
     radiation: Mapping[str, Any]
     atmosphere: Mapping[str, Any]
     light: Mapping[str, Any] = field(default_factory=dict)
+    sizes_m: Sequence[float] = (0.2, 1.0)
+    optics: Mapping[str, Any] = field(default_factory=dict)
+    fill_range_m: float = 0.5
     ground_z_m: float = 0.0
 
 
@@ -328,13 +336,6 @@ def sensors_m(setup: Setup, conditions: Conditions) -> np.ndarray:
         centre = length_m * np.array([np.sin(away), np.cos(away)])
     table = sensors.grid_around(centre, **setup.sensors, ground_z_m=setup.ground_z_m)
     return table[["x_m", "y_m", "z_m"]].to_numpy(float)
-
-
-def misplaced(places_m: np.ndarray, error_m: float, seed: int) -> np.ndarray:
-    """Places (s, 3), each wrong by `error_m` in a level direction of its own [m]."""
-    azimuth = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(places_m))
-    way = np.stack([np.sin(azimuth), np.cos(azimuth), np.zeros_like(azimuth)], axis=1)
-    return places_m + error_m * way
 
 
 def times(setup: Setup, conditions: Conditions) -> pd.DatetimeIndex:

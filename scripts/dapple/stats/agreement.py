@@ -70,6 +70,21 @@ def compare(
     }
 
 
+def rmse_rel(par: np.ndarray, reference: np.ndarray, open_sky: np.ndarray) -> float:
+    """Root mean square difference as a share of open-sky PAR.
+
+    Parameters
+    ----------
+    par, reference : (n, t) float64
+        PAR at n sensors and t times.
+    open_sky : (t,) float64
+        PAR without a tree in the same unit; times without light are left out.
+    """
+    lit = open_sky > 0
+    relative = (par[:, lit] - reference[:, lit]) / open_sky[lit]
+    return float(np.sqrt((relative**2).mean()))
+
+
 def table(rows: dict[str, dict[str, float]]) -> pd.DataFrame:
     """One row per reconstruction, from what `compare` returned for each."""
     return pd.DataFrame(

@@ -143,6 +143,21 @@ def interval_means(
     return (up_to(last) - up_to(first)) / (last - first)
 
 
+def measured(records: pd.DataFrame) -> xr.DataArray:
+    """Measured PAR of the sensors and times of a table of records, as (sensor, time).
+
+    Parameters
+    ----------
+    records : DataFrame
+        As `pair` gives it; every reconstruction has the same measurements.
+    """
+    one = records[records["reconstruction"] == records["reconstruction"].iloc[0]]
+    wide = one.pivot(index="sensor", columns="time", values="measured")
+    when = pd.to_datetime(wide.columns, utc=True).tz_localize(None).to_numpy()
+    coords = {"sensor": wide.index.to_numpy(str), "time": when}
+    return xr.DataArray(wide.to_numpy(), coords, ("sensor", "time"))
+
+
 def simulated(light: xr.Dataset, reconstruction: str) -> pd.DataFrame:
     """Simulated light alone as a table of records, where nothing was measured."""
     table = light["par_umol_m2_s"].to_dataframe("simulated").reset_index()

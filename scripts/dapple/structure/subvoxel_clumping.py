@@ -13,6 +13,7 @@ from dapple.errors import InputError
 from dapple.formats.shots import Shots
 from dapple.structure import leaf_angles, occlusion, returns
 from dapple.structure.returns import Kinds
+from dapple.structure.summary import voxel_area_m2
 from dapple.structure.traversal import (
     HIT,
     entry_and_exit,
@@ -101,7 +102,7 @@ def correct(
         found = clumping_index(corrected, shots, kinds=kinds, max_shots=max_shots)
         index = float(np.clip(found, *bounds))
         corrected[DENSITY] = density.copy(data=effective * index)
-    before = float(np.nansum(density.to_numpy(), dtype=np.float64) * size**3)
+    before = voxel_area_m2(voxels)
     corrected.attrs |= {"clumping_index": index, "leaf_area_before_m2": before}
     return corrected
 

@@ -33,6 +33,12 @@ def of_meshes(leaves: Mesh, wood: Mesh, truth: dict | None = None) -> dict:
     } | _truth(truth)
 
 
+def voxel_area_m2(voxels: xr.Dataset) -> float:
+    """Plant area of the voxels whose density is known [m²]."""
+    density = voxels["plant_area_density_m2_m3"].to_numpy()
+    return float(np.nansum(density, dtype=np.float64) * float(voxels.attrs["voxel_size_m"]) ** 3)
+
+
 def of_voxels(dataset: xr.Dataset, wood: Mesh | None = None, truth: dict | None = None) -> dict:
     """Facts of a reconstruction made of turbid voxels.
 
@@ -63,9 +69,7 @@ def of_voxels(dataset: xr.Dataset, wood: Mesh | None = None, truth: dict | None 
     }
     return {
         # Densities for light, which account for clumps, do not add up to the leaf area.
-        "leaf_area_m2": dataset.attrs.get(
-            "leaf_area_before_m2", float(np.nansum(pad, dtype=np.float64) * voxel_m3)
-        ),
+        "leaf_area_m2": dataset.attrs.get("leaf_area_before_m2", voxel_area_m2(dataset)),
         "wood_area_m2": wood.area_m2 if wood else 0.0,
         "n_elements": int(leafy.sum()),
         "volume_m3": float(leafy.sum() * voxel_m3),

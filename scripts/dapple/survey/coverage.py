@@ -6,7 +6,8 @@ import numpy as np
 
 from dapple.errors import InputError
 from dapple.formats.shots import Shots
-from dapple.structure.voxels import Grid, plant_area_density
+from dapple.structure.voxel_sums import Grid
+from dapple.structure.voxels import plant_area_density
 from dapple.survey.correction import CLASSES, contact_frequency, coverage_classes
 from dapple.survey.fill import krige
 from dapple.survey.hemisphere import Beams

@@ -1,45 +1,42 @@
-"""Signals that a run can be judged by without knowing the truth, gathered from its evidence."""
+"""Signals that a run can be judged by without knowing the truth, gathered from its run."""
 
 import math
 
 import numpy as np
 import xarray as xr
 
+from dapple.structure.summary import voxel_area_m2
 from dapple.verdict import signals_light, signals_scan, signals_structure
-from dapple.verdict.inputs import Evidence
+from dapple.verdict.run_data import RunData
 
 SEED = 20_240_823
-"""Draws the points and beams that are looked at: the same evidence gives the same signals."""
+"""Draws the points and beams that are looked at: the same run gives the same signals."""
 
 
-def measure(evidence: Evidence) -> dict[str, float]:
-    """Measure every signal; NaN where the evidence does not hold it.
+def measure(run: RunData) -> dict[str, float]:
+    """Measure every signal; NaN where the run does not hold it.
 
     Parameters
     ----------
-    evidence : Evidence
+    run : RunData
 
     Returns
     -------
     dict of str to float
-        Keys are those of `catalogue.SIGNALS`, always all of them. Fine and coarse are the smallest
-        and the largest voxels there are. Takes less than a second on a tree of half a million
-        points and a few million shots.
+        Keys are those of `signal_meanings.SIGNALS`, always all of them. Fine and coarse are the
+        smallest and the largest voxels there are. Takes less than a second on a tree of half a
+        million points and a few million shots.
     """
-    sizes = sorted(evidence.voxels, key=lambda n: float(evidence.voxels[n].attrs["voxel_size_m"]))
-    fine = evidence.voxels[sizes[0]] if sizes else None
-    coarse = evidence.voxels[sizes[-1]] if len(sizes) > 1 else None
+    sizes = sorted(run.voxels, key=lambda n: float(run.voxels[n].attrs["voxel_size_m"]))
+    fine = run.voxels[sizes[0]] if sizes else None
+    coarse = run.voxels[sizes[-1]] if len(sizes) > 1 else None
     names = (sizes[0] if sizes else "", sizes[-1] if len(sizes) > 1 else "")
-    return (
-        _of_scan(evidence, fine)
-        | _of_structure(evidence, fine, coarse)
-        | _of_light(evidence, *names)
-    )
+    return _of_scan(run, fine) | _of_structure(run, fine, coarse) | _of_light(run, *names)
 
 
-def _of_scan(evidence: Evidence, fine: xr.Dataset | None) -> dict[str, float]:
+def _of_scan(run: RunData, fine: xr.Dataset | None) -> dict[str, float]:
     rng = np.random.default_rng(SEED)
-    shots, cloud = evidence.shots, evidence.cloud
+    shots, cloud = run.shots, run.cloud
     shift_m, residual_m = signals_scan.scan_fit(cloud, rng)
     found = {
         "scan_count": signals_scan.scan_count(shots, cloud),
@@ -54,9 +51,9 @@ def _of_scan(evidence: Evidence, fine: xr.Dataset | None) -> dict[str, float]:
     if fine is not None:
         coverage["shots_per_voxel"] = signals_scan.shots_per_voxel(fine)
         coverage["unknown_share"] = signals_scan.unknown_share(fine)
-        if evidence.sensors_m is not None and evidence.sun_zenith_deg is not None:
+        if run.sensors_m is not None and run.sun_zenith_deg is not None:
             unknown, seen = signals_scan.on_sun_beams(
-                fine, evidence.sensors_m, evidence.sun_zenith_deg, evidence.sun_azimuth_deg, rng
+                fine, run.sensors_m, run.sun_zenith_deg, run.sun_azimuth_deg, rng
             )
             coverage |= {"unknown_on_sun_beams": unknown, "seen_on_sun_beams": seen}
         else:
@@ -67,22 +64,22 @@ def _of_scan(evidence: Evidence, fine: xr.Dataset | None) -> dict[str, float]:
 
 
 def _of_structure(
-    evidence: Evidence, fine: xr.Dataset | None, coarse: xr.Dataset | None
+    run: RunData, fine: xr.Dataset | None, coarse: xr.Dataset | None
 ) -> dict[str, float]:
     rng = np.random.default_rng(SEED)
-    leaves, number = evidence.leaves, evidence.points_per_polygon
+    leaves, number = run.leaves, run.points_per_polygon
     polygons_m2 = leaves.area_m2 if leaves.n_elements else math.nan
 
     def of(grid: xr.Dataset | None, signal) -> float:
         return math.nan if grid is None else signal(grid)
 
-    area_fine, area_coarse = (of(grid, signals_structure.leaf_area_m2) for grid in (fine, coarse))
+    area_fine, area_coarse = (of(grid, voxel_area_m2) for grid in (fine, coarse))
     mean_number = float(np.mean(number)) if number is not None and len(number) else math.nan
     return {
-        "wood_share": signals_structure.wood_share(evidence.cloud),
+        "wood_share": signals_structure.wood_share(run.cloud),
         "sparse_polygons": signals_structure.sparse_share(number),
         "points_per_polygon": mean_number,
-        "distance_to_polygons": signals_structure.distance_to_polygons(evidence.cloud, leaves, rng),
+        "distance_to_polygons": signals_structure.distance_to_polygons(run.cloud, leaves, rng),
         "tilt_departure": signals_structure.tilt_departure(leaves, number),
         "lacking_area": of(fine, lambda grid: signals_structure.lacking_share(leaves, grid)),
         "area_polygons_to_fine": signals_structure.log_ratio(polygons_m2, area_fine),
@@ -94,9 +91,9 @@ def _of_structure(
     }
 
 
-def _of_light(evidence: Evidence, fine: str, coarse: str) -> dict[str, float]:
-    light, shifted = evidence.light, evidence.shifted_light
-    zenith = evidence.sun_zenith_deg
+def _of_light(run: RunData, fine: str, coarse: str) -> dict[str, float]:
+    light, moved = run.light, run.moved_light
+    zenith = run.sun_zenith_deg
     r_fine, difference_fine = signals_light.agreement(light.get("polygons"), light.get(fine))
     r_coarse, difference_coarse = signals_light.agreement(light.get(fine), light.get(coarse))
     names = ("polygons", fine, coarse)
@@ -109,17 +106,17 @@ def _of_light(evidence: Evidence, fine: str, coarse: str) -> dict[str, float]:
         "difference_polygons_fine": difference_fine,
         "r_fine_coarse": r_coarse,
         "difference_fine_coarse": difference_coarse,
-        "sensitivity_polygons": _sensitivity(light, shifted, "polygons"),
-        "sensitivity_fine": _sensitivity(light, shifted, fine),
-        "sensitivity_coarse": _sensitivity(light, shifted, coarse),
-        "clock_lag_min": signals_light.best_lag_min(some, evidence.measured_umol_m2_s),
+        "sensitivity_polygons": _sensitivity(light, moved, "polygons"),
+        "sensitivity_fine": _sensitivity(light, moved, fine),
+        "sensitivity_coarse": _sensitivity(light, moved, coarse),
+        "clock_lag_min": signals_light.best_lag_min(some, run.measured_umol_m2_s),
         "misplaced_share": signals_light.misplaced_share(
             some,
-            next((shifted[n] for n in names if n in shifted), None),
-            evidence.measured_umol_m2_s,
+            next((moved[n] for n in names if n in moved), None),
+            run.measured_umol_m2_s,
         ),
     }
 
 
-def _sensitivity(light: dict[str, xr.Dataset], shifted: dict[str, xr.Dataset], name: str) -> float:
-    return signals_light.shift_sensitivity(light.get(name), shifted.get(name))
+def _sensitivity(light: dict[str, xr.Dataset], moved: dict[str, xr.Dataset], name: str) -> float:
+    return signals_light.shift_sensitivity(light.get(name), moved.get(name))

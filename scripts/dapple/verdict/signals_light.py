@@ -8,11 +8,11 @@ import xarray as xr
 PAR = "par_umol_m2_s"
 
 
-def shift_sensitivity(light: xr.Dataset | None, shifted: xr.Dataset | None) -> float:
+def shift_sensitivity(light: xr.Dataset | None, moved: xr.Dataset | None) -> float:
     """Root mean square change of PAR when sensors move a little, over its standard deviation."""
-    if light is None or shifted is None:
+    if light is None or moved is None:
         return math.nan
-    here, there = light[PAR].to_numpy(), shifted[PAR].to_numpy()
+    here, there = light[PAR].to_numpy(), moved[PAR].to_numpy()
     spread = here.std()
     return float(np.sqrt(((there - here) ** 2).mean()) / spread) if spread > 0 else math.nan
 
@@ -76,17 +76,17 @@ def best_lag_min(
 
 
 def misplaced_share(
-    light: xr.Dataset | None, shifted: xr.Dataset | None, measured: xr.DataArray | None
+    light: xr.Dataset | None, moved: xr.Dataset | None, measured: xr.DataArray | None
 ) -> float:
     """Share of sensors whose records are like the light beside them rather than at them.
 
     Sensors moved in any direction: where positions are right, few fit better there; where they
     are wrong by more than the move, half of them.
     """
-    if light is None or shifted is None or measured is None:
+    if light is None or moved is None or measured is None:
         return math.nan
     here, records, when, recorded = _paired(light, measured)
-    there = _paired(shifted, measured)[0]
+    there = _paired(moved, measured)[0]
     if not len(records):
         return math.nan
     at = np.array([np.interp(when, recorded, row) for row in records])

@@ -14,12 +14,6 @@ from dapple.structure.voxels import CAPPED
 DENSITY = "plant_area_density_m2_m3"
 
 
-def leaf_area_m2(voxels: xr.Dataset) -> float:
-    """Plant area of the voxels whose density is known [m²]."""
-    density = voxels[DENSITY].to_numpy()
-    return float(np.nansum(density, dtype=np.float64) * float(voxels.attrs["voxel_size_m"]) ** 3)
-
-
 def capped_share(voxels: xr.Dataset) -> float:
     """Share of the plant area that lies in voxels at the cap."""
     density = np.nan_to_num(voxels[DENSITY].to_numpy()).astype(np.float64)

@@ -1,0 +1,48 @@
+"""Reconstructions of several sizes, read when they are needed."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from dapple.formats import voxel_grids
+from dapple.scene import scene_files
+from dapple.scene.surfaces import WOOD, Scene
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """A reconstruction of one size.
+
+    Attributes
+    ----------
+    kind : {"polygons", "voxels"}
+    size_m : float
+        Edge of the voxels that polygons were made in, or of the turbid voxels [m].
+    load : callable
+        Reads the scene.
+    """
+
+    kind: str
+    size_m: float
+    load: Callable[[], Scene]
+
+
+def polygons(
+    sizes_m: Sequence[float], leaves: Sequence[str], wood: Sequence[str], ground_z_m: float
+) -> list[Geometry]:
+    """Polygons of all sizes of which there are files."""
+
+    def load(one: str, branches: str) -> Callable[[], Scene]:
+        return lambda: scene_files.read([one], branches, ground_z_m)[0]
+
+    files = zip(sizes_m, leaves, wood, strict=False)
+    return [Geometry("polygons", size_m, load(*paths)) for size_m, *paths in files]
+
+
+def voxels(sizes_m: Sequence[float], grids: Sequence[str], base: Scene) -> list[Geometry]:
+    """Turbid voxels of all sizes of which there are files, around the wood of a scene."""
+
+    def load(path: str) -> Callable[[], Scene]:
+        return lambda: Scene(base.of(WOOD), voxel_grids.read(path), base.ground_z_m)
+
+    files = zip(sizes_m, grids, strict=False)
+    return [Geometry("voxels", size_m, load(path)) for size_m, path in files]

@@ -1,0 +1,235 @@
+"""The stages of a run on data in memory, each written once.
+
+Rules run one stage a script, from file to file; stability map, advice, trade-off and benchmarks run
+the same functions one after the other. From points to light:
+
+    cloud.clean.clean         points without noise, one a voxel
+    cloud.classify.classify   leaf or wood
+    polygons, voxels          what a scan is rebuilt as
+    scene                     what light meets
+    sun, paths, products      shadow rays to the sun's disc; paths back from the sensors, once for
+                              any sky and spectrum; both put together under a sky
+"""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from dapple.errors import EmptyCloudError
+from dapple.formats import meshes as mesh_files
+from dapple.formats.clouds import LEAF, WOOD, Cloud
+from dapple.formats.meshes import Mesh
+from dapple.formats.netcdf import times
+from dapple.formats.shots import Shots
+from dapple.light import series, transport, visibility
+from dapple.light.light_model import Model, Tracing, interpolated, simplified, thinned
+from dapple.light.series import Light
+from dapple.light.tensor import Transport
+from dapple.light.visibility import Sunlit
+from dapple.scene.scene_optics import Optics
+from dapple.scene.surfaces import Scene, of_kinds
+from dapple.scene.traced import TracedScene
+from dapple.structure.polygons import reconstruct
+from dapple.structure.returns import Kinds, kinds_by_place
+from dapple.structure.voxel_sums import Grid
+from dapple.structure.voxels import plant_area_density
+
+
+def polygons(cloud: Cloud, *, seed: int, **settings: Any) -> dict[str, Mesh]:
+    """One planar polygon per voxel, separately for leaf and wood.
+
+    Parameters
+    ----------
+    cloud : Cloud
+        With `Classification`.
+    seed : int
+    **settings
+        Of `structure.polygons.reconstruct`.
+
+    Returns
+    -------
+    dict of str to Mesh
+        `leaf` and `wood`; no wood where no point is wood.
+
+    Raises
+    ------
+    EmptyCloudError
+        No point is leaf.
+    """
+    kinds = cloud.attributes["Classification"]
+    leaf_m, wood_m = (cloud.xyz_m[kinds == kind] for kind in (LEAF, WOOD))
+    return {
+        "leaf": reconstruct(leaf_m, what="leaf", seed=seed, **settings),
+        "wood": reconstruct(wood_m, what="wood", seed=seed, **settings)
+        if len(wood_m)
+        else mesh_files.empty(),
+    }
+
+
+def voxels(
+    shots: Shots | Iterable[Shots], cloud: Cloud, size_m: float, *, kinds: Kinds, **settings: Any
+) -> xr.Dataset:
+    """Plant area density in voxels around the classified points.
+
+    Parameters
+    ----------
+    shots : Shots or iterable of Shots
+        The whole scan, misses included.
+    cloud : Cloud
+        Classified.
+    size_m : float
+        Edge of the voxels [m].
+    kinds : callable
+        What each return is, as `return_kinds` tells.
+    **settings
+        Of `structure.voxels.plant_area_density`.
+    """
+    bounds_m = np.array([cloud.xyz_m.min(axis=0), cloud.xyz_m.max(axis=0)])
+    return plant_area_density(shots, Grid.around(bounds_m, size_m), kinds=kinds, **settings)
+
+
+def return_kinds(cloud: Cloud, majority_voxel_m: float) -> Kinds:
+    """What each return of a scan is, by the classified points around it.
+
+    Parameters
+    ----------
+    cloud : Cloud
+        Classified, filtered and thinned.
+    majority_voxel_m : float
+        Edge of the voxels in which the classification took the majority [m].
+    """
+    kinds = cloud.attributes["Classification"]
+    return kinds_by_place(cloud.xyz_m, kinds, voxel_size_m=majority_voxel_m)
+
+
+def scene(
+    meshes: dict[str, Mesh], voxels: xr.Dataset | None = None, *, ground_z_m: float = 0.0
+) -> Scene:
+    """What light meets: leaves and wood, turbid voxels, flat ground.
+
+    Parameters
+    ----------
+    meshes : dict of str to Mesh
+        `leaf` and `wood`, as far as there are such.
+    voxels : xarray.Dataset or None
+        Plant area density.
+    ground_z_m : float
+        Height of the ground [m].
+
+    Raises
+    ------
+    EmptyCloudError
+        Nothing at all.
+    """
+    found = Scene(of_kinds(**meshes), voxels, ground_z_m)
+    if not found.filled and (voxels is None or not (voxels["plant_area_density_m2_m3"] > 0).any()):
+        raise EmptyCloudError("scene", "no leaf and no wood", "some", "Check the classes.")
+    return found
+
+
+def sun(
+    scene: TracedScene,
+    sensors_m: np.ndarray,
+    sky: xr.Dataset,
+    model: Model,
+    tracing: Tracing,
+    *,
+    seed: int,
+) -> Sunlit:
+    """What sensors see of the sun at the times of a sky, traced as often as a model wants.
+
+    Parameters
+    ----------
+    scene : TracedScene
+    sensors_m : (n, 3) float64
+        Local frame [m].
+    sky : xarray.Dataset
+        For its times and suns.
+    model : Model
+        Sun and time step count.
+    tracing : Tracing
+    seed : int
+    """
+    minutes = (times(sky) - times(sky)[0]).total_seconds().to_numpy() / 60
+    chosen = thinned(minutes, model.step_min)
+    seen = visibility.sunlit(
+        scene,
+        sensors_m,
+        series.towards_sun(sky)[chosen],
+        tolerance=tracing.sun_tolerance,
+        max_rays=tracing.max_shadow_rays,
+        sun_diameter_deg=0.0 if model.sun == "point" else tracing.sun_diameter_deg,
+        aperture_m=tracing.aperture_m,
+        seed=seed,
+    )
+    return interpolated(seen, minutes[chosen], minutes) if len(chosen) < len(minutes) else seen
+
+
+def paths(
+    scene: TracedScene,
+    sensors_m: np.ndarray,
+    model: Model,
+    tracing: Tracing,
+    *,
+    optics: Optics | None = None,
+    seed: int,
+) -> Transport:
+    """Rays to the sky and paths back from the sensors, counted for any sky, spectrum and time.
+
+    Parameters
+    ----------
+    scene : TracedScene
+    sensors_m : (n, 3) float64
+        Local frame [m].
+    model : Model
+        Sky patches and orders count.
+    tracing : Tracing
+    optics : Optics or None
+        Nominal spectra by which errors are judged, where rays are added until they are small.
+    seed : int
+    """
+    return transport.collect(
+        scene,
+        sensors_m,
+        n_paths=tracing.paths,
+        n_sky_rays=tracing.sky_rays,
+        max_growth=tracing.max_growth,
+        tolerance=tracing.path_tolerance,
+        n_patches=model.sky_patches,
+        max_orders=model.max_orders,
+        sun_kernel_deg=tracing.sun_kernel_deg,
+        aperture_m=tracing.aperture_m,
+        optics=optics,
+        seed=seed,
+    )
+
+
+def products(
+    sunlit: Sunlit,
+    counted: Transport,
+    sky: xr.Dataset,
+    optics: Optics,
+    model: Model,
+    tracing: Tracing,
+) -> Light:
+    """Light under a sky from what was traced of the sun and of paths.
+
+    Parameters
+    ----------
+    sunlit : Sunlit
+        At the times of the sky.
+    counted : Transport
+        Paths of the same sensors.
+    sky : xarray.Dataset
+        Sun and sky in b bands.
+    optics : Optics
+        In the same bands.
+    model : Model
+        Sky, ground and bands count.
+    tracing : Tracing
+        For the kernel of the sun.
+    """
+    kept = simplified(sky, optics, model)
+    return series.compute(sunlit, counted, *kept, sun_kernel_deg=tracing.sun_kernel_deg)

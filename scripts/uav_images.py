@@ -1,0 +1,62 @@
+"""Render the images that a UAV's camera takes of a virtual plot."""
+
+import time
+
+import numpy as np
+
+from dapple.formats import json, meshes, rasters, tables
+from dapple.formats.rasters import Raster
+from dapple.optics.bands import CAMERA_NM
+from dapple.streams import stream_seed
+from dapple.virtual import camera
+from dapple.virtual.plot_materials import assemble
+from dapple.workflow import options, peak_rss_mb, run
+
+
+def main(snakemake):
+    settings, inputs = options(snakemake.params), snakemake.input
+    begun, seed = time.perf_counter(), settings["seed"]
+    origin_m = np.asarray(settings["origin_m"], float)
+    trees = tables.read(inputs.trees)
+    trees[["x_m", "y_m", "z_m"]] -= origin_m
+    world, materials = assemble(
+        trees,
+        [meshes.read_ply(path) for path in inputs.leaves],
+        [meshes.read_ply(path) for path in inputs.wood],
+        meshes.read_ply(inputs.terrain),
+        ground=settings["ground"],
+        ground_seed=stream_seed(seed, "ground"),
+        **{name: settings[name] for name in ("lowest_to_highest_lcc", "lcc_layers", "water_cm")},
+    )
+    scene = camera.build(world, materials)
+    print(f"{len(world.faces)} triangles, {len(materials.reflectance)} materials")
+    del world
+    built = time.perf_counter()
+    view = camera.Camera.over(settings["size_m"], settings["pixel_m"])
+    image = camera.photograph(scene, view, **settings["light"], seed=stream_seed(seed, "paths"))
+    image = camera.with_noise(image, **settings["noise"], seed=stream_seed(seed, "noise"))
+    rasters.write(
+        snakemake.output.images,
+        Raster(
+            image,
+            origin_m[0] + view.left_m,
+            origin_m[1] + view.top_m,
+            view.pixel_m,
+            settings["crs"],
+            tuple(f"{centre:.0f}" for centre in CAMERA_NM),
+        ),
+    )
+    facts = {
+        "rows": view.rows,
+        "columns": view.columns,
+        "mean_reflectance": image.mean(axis=(1, 2)).astype(float),
+        "build_s": built - begun,
+        "trace_s": time.perf_counter() - built,
+        "peak_rss_mb": peak_rss_mb(),
+    }
+    json.write(snakemake.output.summary, facts)
+    print(facts)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)
