@@ -28,7 +28,7 @@ if WORSENED:
         benchmark:
             benchmarks("stability_records")
         conda:
-            "../../envs/dapple.yaml"
+            "../../envs/stability.yaml"
         threads: 2
         resources:
             mem_mb=4000,

@@ -24,7 +24,7 @@ rule stability_base:
     wildcard_constraints:
         world="[0-9]+",
     conda:
-        "../../envs/cloud.yaml"
+        "../../envs/stability.yaml"
     threads: 1
     resources:
         mem_mb=3000,
@@ -52,7 +52,7 @@ rule stability_batch:
         stressor="[a-z_]+",
         world="[0-9]+",
     conda:
-        "../../envs/cloud.yaml"
+        "../../envs/stability.yaml"
     threads: 1
     resources:
         mem_mb=stability_memory,
