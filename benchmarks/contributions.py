@@ -19,13 +19,14 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 from dapple import steps
 from dapple.config.settings import Settings, validate
 from dapple.formats import json, meshes, tables
-from dapple.light import series
+from dapple.light import light_datasets, series
 from dapple.light.light_model import Model, Tracing
 from dapple.scene import scene_optics, traced
+from dapple.sky.open_sky import open_sky_par
 from dapple.sky.radiation_series import broadband
 from dapple.sky.sky_radiance import sky_dataset
 from dapple.sky.sun import Site
-from dapple.stats import correlation, measured
+from dapple.stats import measured, measures
 from dapple.stats.pairs import pair
 from dapple.streams import stream_seed
 from dapple.times import time_range
@@ -98,8 +99,8 @@ class Run:
     def with_diffuse_share_of(self, other):
         """The same total light on the level, split into beam and diffuse as in another sky."""
         changed = self.sky.copy()
-        total = series.open_sky_par(self.sky)
-        share = other["diffuse_horizontal_umol_m2_s"].sum("band") / series.open_sky_par(other)
+        total = open_sky_par(self.sky)
+        share = other["diffuse_horizontal_umol_m2_s"].sum("band") / open_sky_par(other)
         own_diffuse = self.sky["diffuse_horizontal_umol_m2_s"].sum("band")
         own_beam = total - own_diffuse
         changed["diffuse_horizontal_umol_m2_s"] = (
@@ -134,20 +135,20 @@ class Run:
 
     def score(self, placements, parts=("direct", "sky", "scattered")) -> dict[str, float]:
         """r, RMSE and bias on the reporting records."""
-        open_sky = series.open_sky_par(self.sky)
+        open_sky = open_sky_par(self.sky)
         if placements is None:
             par = np.broadcast_to(open_sky.to_numpy(), (len(self.sensors), len(self.times)))
         else:
             par = np.mean([sum(getattr(p, part) for part in parts) for p in placements], axis=0)
         zero = np.zeros_like(par)
-        dataset = series.dataset(
+        dataset = light_datasets.dataset(
             list(self.sensors["sensor"]), self.times, par=par, direct=zero, sky=zero,
             scattered=zero, standard_error=zero,
         )  # fmt: skip
         offset_s = self.registration["clock_offset_s"]
         table = pair(dataset, self.records, reconstruction="polygons", clock_offset_s=offset_s)
         difference = (table["simulated"] - table["measured"]).to_numpy()
-        r = correlation.pearson(table["measured"].to_numpy(), table["simulated"].to_numpy())
+        r = measures.pearson(table["measured"].to_numpy(), table["simulated"].to_numpy())
         rmse = float(np.sqrt((difference**2).mean()))
         return {"n": len(table), "r": r, "rmse": rmse, "bias": float(difference.mean())}
 

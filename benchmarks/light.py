@@ -27,11 +27,12 @@ import rays
 
 from dapple import steps
 from dapple.formats import meshes, netcdf, voxel_grids
-from dapple.light import series
+from dapple.light import light_datasets
 from dapple.light.light_model import Model, Tracing
 from dapple.light.timestep_series import Reference
 from dapple.scene import scene_files, scene_optics, traced
 from dapple.scene.surfaces import LEAF, WOOD, Scene
+from dapple.sky.open_sky import level_beam, open_sky_par
 
 TIMED = ("load", "direct", "paths", "bands_and_write")
 KINDS = ("polygons", "voxels_0.2", "voxels_1.0")
@@ -89,13 +90,13 @@ def once(folder: Path, variant: str, tolerance: float) -> dict[str, float]:
     clock.append(time.perf_counter())
     result = steps.products(sunlit, counted, sky, optics, model, tracing)
     names = [f"1_{k}" for k in range(len(sensors))]
-    netcdf.write(folder / "light.nc", series.as_dataset(result, names, netcdf.times(sky)))
+    netcdf.write(folder / "light.nc", light_datasets.as_dataset(result, names, netcdf.times(sky)))
     clock.append(time.perf_counter())
     cpu = time.process_time() - cpu
-    open_sky = series.open_sky_par(sky).to_numpy()
+    open_sky = open_sky_par(sky).to_numpy()
     share = result.standard_error / open_sky
     # As the reference engine does it: from replicates alone, nought where all rays agree.
-    beam = series.level_beam(sky) / open_sky
+    beam = level_beam(sky) / open_sky
     own = sunlit.share.std(axis=0, ddof=1) / np.sqrt(len(sunlit.share))
     plain = share**2 + (own**2 - sunlit.standard_error**2) * beam**2
     return dict(zip(TIMED, np.diff(clock), strict=True)) | {
@@ -127,7 +128,7 @@ def against_reference(folder: Path, scene: Scene, fast: dict, variant: str, n_co
     sensors = pd.DataFrame(np.load(folder / "sensors.npy"), columns=["x_m", "y_m", "z_m"])
     sensors.insert(0, "sensor", [f"1_{k}" for k in range(len(sensors))])
     chosen = np.linspace(0, sky.sizes["time"] - 1, n_compared).astype(int)
-    open_sky = series.open_sky_par(sky).to_numpy()[chosen]
+    open_sky = open_sky_par(sky).to_numpy()[chosen]
 
     def simulate(factor: float):
         scaled = {k: round(v * factor) if "rays" in k else v for k, v in REFERENCE_RAYS.items()}

@@ -12,9 +12,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 import crown
 
 from dapple.frames import direction_from_angles
-from dapple.light import rays_to_sky, series
+from dapple.light import rays_to_sky
 from dapple.scene import patterns, traced
 from dapple.scene.surfaces import Scene
+from dapple.sky.open_sky import towards_sun
 
 SUN_DIAMETER_DEG = 0.533
 
@@ -24,7 +25,7 @@ def shadow_rays(scene: Scene, variant: str, n_sensors: int = 72, n_times: int = 
     loaded = traced.load(scene, variant)
     mi = loaded.mi
     sensors, sky = crown.sensors(n_sensors), crown.sky(n_times)
-    suns, n_rays = series.towards_sun(sky), 256
+    suns, n_rays = towards_sun(sky), 256
     trace = rays_to_sky.sun_rays(
         loaded, sensors, suns, sun_diameter_deg=SUN_DIAMETER_DEG, aperture_m=0.0, seed=1
     )

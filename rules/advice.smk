@@ -23,7 +23,7 @@ if settings.source != "wood":
         input:
             cloud=results("classes/cloud.laz"),
             truth=[],
-            code=code("polygons"),
+            code=code("polygons", unused=["structure.occlusion"]),
         output:
             leaves=results("structure/polygons_{size}/leaves_0.ply"),
             wood=results("structure/polygons_{size}/wood.ply"),

@@ -13,7 +13,7 @@ HOME = Path(str(workflow.current_basedir)).parent
 SCRIPTS = HOME / "scripts"
 sys.path.append(str(SCRIPTS))
 
-from dapple.clock import label, time_range
+from dapple.clock import time_range
 from dapple.cloud.classifiers import CLASSIFIERS
 from dapple.config.settings import validate
 from dapple.errors import InputError
@@ -28,20 +28,30 @@ try:
 except InputError as error:
     sys.exit(f"dapple: {error}")
 
-TIMES = [label(time) for time in time_range(**dict(settings.time))]
+N_TIMES = len(time_range(**dict(settings.time)))
 PLACEMENTS = range(settings.leaves.placements if settings.source == "wood" else 1)
 VOXELS = [name for name in settings.reconstructions if name.startswith("voxels_")]
 LIT = settings.reconstructions if settings.sensors.kind != "none" else ()
 VARIANT = f"{settings.light.variant}_ad"
-REFERENCE_TIMES = TIMES[
-    :: max(1, round(settings.light.timestep.step_min / settings.time.step_min))
-]
+# The per-timestep engine computes some of the times, a few in each job.
+REFERENCE_TIMES = list(
+    range(
+        0,
+        N_TIMES,
+        max(1, round(settings.light.timestep.step_min / settings.time.step_min)),
+    )
+)
+SENSOR_TABLE = settings.sensors.path or "sensors"
+BATCH = settings.light.timestep.times_per_job
+REFERENCE_BATCHES = range(-(-len(REFERENCE_TIMES) // BATCH))
 SKY = {
     "site": settings.site.model_dump(exclude={"timezone"}),
     "radiation": settings.radiation.broadband(),
     "atmosphere": settings.radiation.atmosphere(),
 }
-REFERENCE = settings.light.timestep.model_dump(exclude={"step_min"}) | {
+REFERENCE = settings.light.timestep.model_dump(
+    exclude={"step_min", "times_per_job"}
+) | {
     "sun_diameter_deg": settings.light.sun_diameter_deg,
     "aperture_m": settings.light.aperture_m,
     "variant": f"{VARIANT}_rgb",
@@ -59,11 +69,16 @@ wildcard_constraints:
     meshed=r"polygons|truth",
     size=r"[0-9.]+",
     placement=r"[0-9]+",
+    batch=r"[0-9]+",
 
 
 def results(path):
     """A file of this experiment."""
     return f"results/{settings.experiment}/{path}"
+
+
+# Frame and clock, where records are to tell them; else they are as configured.
+FITTED = results("registration/registration.json") if settings.registration.fit else []
 
 
 def logs(name):
@@ -81,9 +96,12 @@ def said(text):
     return f"{settings.experiment}: {text}"
 
 
-def code(script):
-    """The modules that a script is made of: an edit reruns the rule."""
-    return [local(path) for path in code_of(SCRIPTS / f"{script}.py")]
+def code(script, unused=()):
+    """The modules that a script is made of: an edit reruns the rule.
+
+    Modules that this configuration does not use, by their names below dapple, are left out.
+    """
+    return [local(path) for path in code_of(SCRIPTS / f"{script}.py", unused)]
 
 
 def beside_code(path):
@@ -159,6 +177,21 @@ def transports(wildcards):
     """The counted paths of all placements of a reconstruction."""
     name = wildcards.reconstruction
     return [results(f"light/transport/{name}_{p}.nc") for p in placements(name)]
+
+
+def stem_wood():
+    """The wood around whose stem a grid of sensors stands: true where it is known."""
+    if settings.sensors.kind != "grid":
+        return []
+    meshed = "truth" if settings.source == "virtual" else "polygons"
+    return results(f"structure/{meshed}/wood.ply")
+
+
+def timestep_positions(wildcards):
+    """Which of the per-timestep engine's times a job computes."""
+    positions = range(len(REFERENCE_TIMES))
+    first = int(wildcards.batch) * BATCH
+    return list(positions[first : first + BATCH])
 
 
 def wood_mesh(wildcards):

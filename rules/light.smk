@@ -5,7 +5,7 @@ Needs   structure/{reconstruction}/, sky/sky.nc, sky/optics.nc, sky/sensors.csv;
         light.model is advised
 Makes   light/transport/{reconstruction}_{placement}.nc counted paths: any sky, spectrum and time
         light/{reconstruction}.nc                       the series of all times
-        light/timesteps/{reconstruction}/{time}.nc      the independent check, one cached file a timestep
+        light/timesteps/{reconstruction}/{batch}.nc     the independent check, some times in each file
         light/reference/{reconstruction}.nc             its series
         light/ground_map.nc                             light on the ground at a few times
 """
@@ -20,18 +20,11 @@ rule timesteps:
         sensors=results("sky/sensors.csv"),
         code=code("timesteps"),
     output:
-        # Kept when the rule runs again: the script recomputes only those whose inputs changed.
-        times=update(
-            expand(
-                results("light/timesteps/{reconstruction}/{time}.nc"),
-                time=REFERENCE_TIMES,
-                allow_missing=True,
-            )
-        ),
+        light=results("light/timesteps/{reconstruction}/{batch}.nc"),
     log:
-        logs("timesteps_{reconstruction}"),
+        logs("timesteps/{reconstruction}/{batch}"),
     benchmark:
-        benchmarks("timesteps_{reconstruction}")
+        benchmarks("timesteps/{reconstruction}/{batch}")
     conda:
         "../envs/dapple.yaml"
     threads: 2
@@ -40,11 +33,13 @@ rule timesteps:
     params:
         engine=REFERENCE,
         ground_z_m=settings.ground_z_m,
-        times=[TIMES.index(time) for time in REFERENCE_TIMES],
-        n_times=len(REFERENCE_TIMES),
+        sensor_table=SENSOR_TABLE,
+        times=REFERENCE_TIMES,
+        positions=timestep_positions,
+        n_positions=lambda wildcards: len(timestep_positions(wildcards)),
         seed=stream("timesteps"),
     message:
-        said("Mitsuba, {wildcards.reconstruction}, {params.n_times} times")
+        said("Mitsuba, {wildcards.reconstruction}, {params.n_positions} times")
     script:
         "../scripts/timesteps.py"
 
@@ -52,8 +47,8 @@ rule timesteps:
 rule reference:
     input:
         times=expand(
-            results("light/timesteps/{reconstruction}/{time}.nc"),
-            time=REFERENCE_TIMES,
+            results("light/timesteps/{reconstruction}/{batch}.nc"),
+            batch=REFERENCE_BATCHES,
             allow_missing=True,
         ),
         code=code("reference"),
@@ -109,6 +104,7 @@ if settings.light.engine == "transport":
                 "aperture_m",
             ),
             ground_z_m=settings.ground_z_m,
+            sensor_table=SENSOR_TABLE,
             variant=f"{VARIANT}_mono",
             seed=lambda wildcards: stream("transport", wildcards.placement),
         message:
@@ -146,7 +142,7 @@ if settings.light.engine == "transport":
                 "aperture_m",
             ),
             ground_z_m=settings.ground_z_m,
-            n_times=len(TIMES),
+            n_times=N_TIMES,
             variant=f"{VARIANT}_mono",
             seed=stream("light"),
         message:

@@ -15,7 +15,7 @@ rule sky:
         radiation=(
             data(settings.radiation.path) if settings.radiation.kind == "table" else []
         ),
-        registration=results("registration/registration.json"),
+        registration=FITTED,
         code=code("sky"),
     output:
         sky=results("sky/sky.nc"),
@@ -32,7 +32,7 @@ rule sky:
     params:
         **SKY,
         time=dict(settings.time),
-        n_times=len(TIMES),
+        n_times=N_TIMES,
     message:
         said("sun and sky at {params.n_times} times")
     script:
@@ -74,9 +74,8 @@ rule optics:
 rule sensors:
     input:
         table=data(settings.sensors.path) if settings.sensors.kind == "table" else [],
-        registration=results("registration/registration.json"),
-        leaves=leaf_meshes("polygons"),
-        wood=results("structure/polygons/wood.ply"),
+        registration=FITTED if settings.sensors.kind == "table" else [],
+        wood=stem_wood(),
         code=code("sensors"),
     output:
         sensors=results("sky/sensors.csv"),
@@ -93,6 +92,11 @@ rule sensors:
         kind=settings.sensors.kind,
         table=settings.sensors.table(),
         grid=settings.sensors.grid(),
+        origin_m=(
+            settings.registration.origin_m
+            if settings.sensors.kind == "table"
+            else None
+        ),
         ground_z_m=settings.ground_z_m,
     message:
         said("sensors in the local frame")

@@ -23,7 +23,7 @@ rule records:
         ),
         sensors=results("sky/sensors.csv"),
         sky=results("sky/sky.nc"),
-        registration=results("registration/registration.json"),
+        registration=FITTED,
         code=code("records"),
     output:
         records=results("statistics/records.csv"),

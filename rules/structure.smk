@@ -23,7 +23,12 @@ if settings.source != "wood":
                 if settings.source == "virtual"
                 else []
             ),
-            code=code("polygons"),
+            code=code(
+                "polygons",
+                unused=(
+                    [] if settings.corrections.occlusion else ["structure.occlusion"]
+                ),
+            ),
         output:
             leaves=results("structure/polygons/leaves_0.ply"),
             wood=results("structure/polygons/wood.ply"),
@@ -106,7 +111,14 @@ rule voxels:
     input:
         shots=results("scan/shots.parquet"),
         classes=results("classes/cloud.laz"),
-        code=code("voxels"),
+        code=code(
+            "voxels",
+            unused=(
+                []
+                if settings.corrections.clumping
+                else ["structure.subvoxel_clumping"]
+            ),
+        ),
     output:
         voxels=results("structure/voxels_{size}/voxels.nc"),
         amapvox=results("structure/voxels_{size}/voxels.vox"),

@@ -1,7 +1,7 @@
 """Transport engine against the per-timestep engine, at the times that both have."""
 
 from dapple.formats import netcdf, tables
-from dapple.light.series import open_sky_par
+from dapple.sky.open_sky import open_sky_par
 from dapple.stats import agreement
 from dapple.workflow import run
 

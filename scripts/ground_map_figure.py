@@ -2,7 +2,7 @@
 
 from dapple.figures import ground_map, style
 from dapple.formats import meshes, netcdf
-from dapple.scene.sensors import stem_position
+from dapple.structure.stem import stem_position
 from dapple.workflow import run
 
 

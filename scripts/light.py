@@ -2,7 +2,7 @@
 
 from dapple import steps
 from dapple.formats import json, netcdf, tables
-from dapple.light import series, transport_files
+from dapple.light import light_datasets, series, transport_files
 from dapple.light.light_model import Model, Tracing
 from dapple.scene import scene_files, scene_optics, traced
 from dapple.streams import stream_seed
@@ -23,7 +23,7 @@ def main(snakemake):
         sunlit = steps.sun(loaded, sensors_m, sky, model, tracing, seed=seed)
         paths = transport_files.read(counted)
         placements.append(steps.products(sunlit, paths, sky, optics, model, tracing))
-    light = series.as_dataset(series.mean(placements), table["sensor"], netcdf.times(sky))
+    light = light_datasets.as_dataset(series.mean(placements), table["sensor"], netcdf.times(sky))
     netcdf.write(snakemake.output.light, light)
 
 

@@ -3,7 +3,7 @@
 from dapple import steps
 from dapple.formats import clouds, json, meshes, voxel_grids
 from dapple.structure import occlusion, summary
-from dapple.structure.subvoxel_clumping import as_estimated
+from dapple.structure.voxel_data import as_estimated
 from dapple.workflow import options, run
 
 

@@ -5,7 +5,7 @@ import pandas as pd
 
 from dapple import findings
 from dapple.formats import json, netcdf, tables
-from dapple.light.series import open_sky_par
+from dapple.sky.open_sky import open_sky_par
 from dapple.stats import measured, plausible_records
 from dapple.stats.measured import Records
 from dapple.stats.pairs import pair
@@ -15,7 +15,7 @@ from dapple.workflow import run
 
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
-    registration = json.read(inputs.registration)
+    registration = json.read(inputs.registration) if inputs.registration else {}
     if params.kind == "virtual":
         truth = netcdf.read(inputs.truth)
         records = Records(simulate(truth, **params.sensor_model, seed=params.seed))
@@ -30,7 +30,7 @@ def main(snakemake):
                 records.table,
                 sky,
                 reconstruction=name,
-                clock_offset_s=registration["clock_offset_s"],
+                clock_offset_s=registration.get("clock_offset_s", 0.0),
             )
             for name, path in zip(params.reconstructions, inputs.light, strict=True)
         ],

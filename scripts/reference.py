@@ -1,16 +1,12 @@
 """Put the timesteps of one reconstruction together."""
 
-import xarray as xr
-
 from dapple.formats import netcdf
+from dapple.light import timestep_series
 from dapple.workflow import run
 
 
 def main(snakemake):
-    times = [netcdf.read(path) for path in snakemake.input.times]
-    series = xr.concat(
-        times, "time", data_vars="minimal", coords="minimal", combine_attrs="drop_conflicts"
-    )
+    series = timestep_series.joined(netcdf.read(path) for path in snakemake.input.times)
     netcdf.write(snakemake.output.light, series)
 
 

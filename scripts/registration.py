@@ -14,10 +14,6 @@ from dapple.workflow import run
 
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
-    if not params.fit:
-        facts = {"fitted": False, "origin_m": params.origin_m, "clock_offset_s": 0.0}
-        json.write(snakemake.output.registration, facts)
-        return
     site = Site(**params.site)
 
     def sky_at(times):

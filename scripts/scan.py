@@ -1,7 +1,7 @@
 """Scan a tree with the virtual terrestrial scanner."""
 
 from dapple.formats import clouds, meshes, shots
-from dapple.scene.sensors import stem_position
+from dapple.structure.stem import stem_position
 from dapple.virtual import scanner
 from dapple.workflow import options, run
 

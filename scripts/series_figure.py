@@ -4,7 +4,7 @@ import pandas as pd
 
 from dapple.figures import daily_courses, style
 from dapple.formats import netcdf, tables
-from dapple.stats import correlation
+from dapple.stats import measures
 from dapple.stats.pairs import simulated
 from dapple.workflow import run
 
@@ -13,7 +13,7 @@ def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
     if inputs.records:
         records = tables.read(inputs.records)
-        r = correlation.per_sensor(records)
+        r = measures.per_sensor(records)
     else:
         parts = [
             simulated(netcdf.read(path), name)

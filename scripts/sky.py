@@ -13,10 +13,11 @@ from dapple.workflow import run
 
 def main(snakemake):
     params = snakemake.params
-    registration = json.read(snakemake.input.registration)
+    fitted = snakemake.input.registration
+    ahead_s = json.read(fitted)["clock_offset_s"] if fitted else 0.0
     site = Site(**params.site)
     # The times are the loggers'; their clock may have been ahead of the true time.
-    times = time_range(**params.time) - pd.Timedelta(seconds=registration["clock_offset_s"])
+    times = time_range(**params.time) - pd.Timedelta(seconds=ahead_s)
     radiation = broadband(times, site, path=snakemake.input.radiation or None, **params.radiation)
     findings.say(radiation.findings)
     sky = sky_dataset(times, site, radiation.values, **params.atmosphere)

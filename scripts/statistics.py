@@ -1,7 +1,7 @@
 """How well simulated light matches measured light, on records that no fit has seen."""
 
 from dapple.formats import tables
-from dapple.stats import correlation
+from dapple.stats import correlation, measures
 from dapple.workflow import run
 
 
@@ -16,7 +16,7 @@ def main(snakemake):
             n_bootstrap=params.n_bootstrap,
             confidence=params.confidence,
         ),
-        output.per_sensor: correlation.per_sensor(unseen),
+        output.per_sensor: measures.per_sensor(unseen),
         output.mixed_model: correlation.mixed_model(unseen),
     }
     for path, table in found.items():

@@ -1,27 +1,27 @@
-"""Light at the sensors by Mitsuba's own integrators, one cached file a timestep."""
+"""Light at the sensors by Mitsuba's own integrators, some times of the day."""
 
 from dapple.formats import netcdf, tables
-from dapple.light.timestep_series import Reference, run_all
-from dapple.scene import scene_files, scene_optics
+from dapple.light import timestep_series
+from dapple.scene import scene_files, scene_optics, sensors
 from dapple.workflow import run
 
 
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
-    reference = Reference(
-        scene_files.read(inputs.leaves, inputs.wood, params.ground_z_m),
+    scenes = scene_files.read(inputs.leaves, inputs.wood, params.ground_z_m)
+    table = tables.read(inputs.sensors)
+    for scene in scenes:
+        meshes = {surface.optics: surface.mesh for surface in scene.filled}
+        sensors.check(table, meshes, where=params.sensor_table)
+    reference = timestep_series.Reference(
+        scenes,
         netcdf.read(inputs.sky).isel(time=params.times),
         scene_optics.read(inputs.optics),
         **params.engine,
         seed=params.seed,
     )
-    computed = run_all(
-        reference,
-        tables.read(inputs.sensors),
-        snakemake.output.times,
-        [*inputs.leaves, inputs.wood],
-    )
-    print(f"{computed} of {len(snakemake.output.times)} timesteps computed")
+    series = timestep_series.joined(reference.at(index, table) for index in params.positions)
+    netcdf.write(snakemake.output.light, series)
 
 
 if __name__ == "__main__":

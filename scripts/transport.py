@@ -4,14 +4,17 @@ from dapple import steps
 from dapple.formats import json, tables
 from dapple.light import transport_files
 from dapple.light.light_model import Model, Tracing
-from dapple.scene import scene_files, scene_optics, traced
+from dapple.scene import scene_files, scene_optics, sensors, traced
 from dapple.workflow import run
 
 
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
     scene = scene_files.read([inputs.leaves], inputs.wood, params.ground_z_m)[0]
-    sensors_m = tables.read(inputs.sensors)[["x_m", "y_m", "z_m"]].to_numpy()
+    table = tables.read(inputs.sensors)
+    meshes = {surface.optics: surface.mesh for surface in scene.filled}
+    sensors.check(table, meshes, where=params.sensor_table)
+    sensors_m = table[["x_m", "y_m", "z_m"]].to_numpy()
     print(f"variant {params.variant}, {len(sensors_m)} sensors")
     counted = steps.paths(
         traced.load(scene, params.variant),

@@ -5,7 +5,7 @@ from pathlib import Path
 from dapple.formats import clouds, json, meshes, netcdf, shots, tables, voxel_grids
 from dapple.scene import scene_files, traced
 from dapple.stats import pairs
-from dapple.structure.subvoxel_clumping import as_estimated
+from dapple.structure.voxel_data import as_estimated
 from dapple.verdict import judgement, signals
 from dapple.verdict.run_data import RunData, points_per_polygon, with_light
 from dapple.workflow import run

@@ -31,6 +31,7 @@ from dapple.light.visibility import Sunlit
 from dapple.scene.scene_optics import Optics
 from dapple.scene.surfaces import Scene, of_kinds
 from dapple.scene.traced import TracedScene
+from dapple.sky.open_sky import towards_sun
 from dapple.structure.polygons import reconstruct
 from dapple.structure.returns import Kinds, kinds_by_place
 from dapple.structure.voxel_sums import Grid
@@ -157,7 +158,7 @@ def sun(
     seen = visibility.sunlit(
         scene,
         sensors_m,
-        series.towards_sun(sky)[chosen],
+        towards_sun(sky)[chosen],
         tolerance=tracing.sun_tolerance,
         max_rays=tracing.max_shadow_rays,
         sun_diameter_deg=0.0 if model.sun == "point" else tracing.sun_diameter_deg,

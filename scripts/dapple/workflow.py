@@ -1,34 +1,23 @@
 """What Snakemake's rules and scripts need: code dependencies, logs, and errors that read well."""
 
-import ast
 import resource
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr, redirect_stdout
-from functools import cache
 from pathlib import Path
 from typing import Any
 
+from dapple.code_use import files_of
 from dapple.errors import InputError
 
-SCRIPTS = Path(__file__).parent.parent
 
-
-def code_of(script: Path) -> tuple[str, ...]:
-    """List the modules of dapple that a script imports, directly or through others.
+def code_of(script: Path, unused: Sequence[str] = ()) -> tuple[str, ...]:
+    """The files of dapple that a script's results depend on, but for modules that it does not use.
 
     As inputs of its rule they make an edit rerun what depends on it, and nothing else.
     """
-    found: set[Path] = set()
-    waiting = [script]
-    while waiting:
-        for module in _imports(waiting.pop()):
-            if module not in found:
-                found.add(module)
-                waiting.append(module)
-    r_code = {beside for module in found for beside in module.parent.glob(f"{module.stem}*.R")}
-    return tuple(sorted(short(path) for path in found | r_code))
+    return tuple(sorted(short(path) for path in files_of(script, unused)))
 
 
 def short(path: Path) -> str:
@@ -38,21 +27,6 @@ def short(path: Path) -> str:
     """
     here = Path.cwd()
     return str(path.relative_to(here) if path.is_relative_to(here) else path)
-
-
-@cache
-def _imports(source: Path) -> list[Path]:
-    """The files behind the `dapple` imports of one Python file."""
-    names: list[str] = []
-    for node in ast.walk(ast.parse(source.read_text())):
-        if isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
-            names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-        elif isinstance(node, ast.Import):
-            names += [alias.name for alias in node.names]
-    paths = (
-        SCRIPTS / f"{name.replace('.', '/')}.py" for name in names if name.startswith("dapple")
-    )
-    return [path for path in paths if path.is_file()]
 
 
 def run(main: Callable[[Any], None], snakemake: Any) -> None:

@@ -6,7 +6,7 @@ import pytest
 import xarray as xr
 
 from dapple.formats.meshes import Mesh
-from dapple.light import series
+from dapple.light import light_datasets
 from dapple.light.moved_sensors import moved_light
 from dapple.scene import traced
 from dapple.scene.surfaces import Scene, of_kinds
@@ -27,7 +27,9 @@ def shaded():
     """Light of a sensor that the sun does not reach, and a sky with the sun overhead."""
     when = pd.DatetimeIndex(["2023-06-21 12:00"], tz="UTC")
     parts = {"direct": 0.0, "sky": SKY, "scattered": 0.0, "par": SKY, "standard_error": 0.0}
-    light = series.dataset(["1_1"], when, **{k: np.full((1, 1), v) for k, v in parts.items()})
+    light = light_datasets.dataset(
+        ["1_1"], when, **{k: np.full((1, 1), v) for k, v in parts.items()}
+    )
     sky = xr.Dataset(
         {
             "sun_zenith_deg": ("time", [0.0]),

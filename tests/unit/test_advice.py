@@ -12,12 +12,13 @@ from dapple.advice.costs import Cost
 from dapple.advice.pilot import Effect, Pilot
 from dapple.formats.meshes import Mesh
 from dapple.formats.netcdf import time_coordinate
-from dapple.light import light_model, series
+from dapple.light import light_model
 from dapple.light.light_model import Model, Tracing
 from dapple.light.visibility import Sunlit
 from dapple.scene import traced
 from dapple.scene.scene_optics import Optics
 from dapple.scene.surfaces import Scene, of_kinds
+from dapple.sky.open_sky import open_sky_par
 
 WAVELENGTH = np.linspace(400, 700, 7)
 OPTICS = Optics.of_tree(
@@ -85,9 +86,7 @@ def test_groups_of_bands_carry_all_the_light():
     for bands in (1, 3):
         fewer, optics = light_model.simplified(sky, OPTICS, Model(bands=bands))
         assert len(optics) == fewer.sizes["band"] == bands
-        assert series.open_sky_par(fewer).to_numpy() == pytest.approx(
-            series.open_sky_par(sky).to_numpy()
-        )
+        assert open_sky_par(fewer).to_numpy() == pytest.approx(open_sky_par(sky).to_numpy())
 
 
 def test_a_full_model_keeps_sky_and_spectra_as_they_are():

@@ -4,6 +4,7 @@ import inspect
 import json
 from datetime import UTC, datetime
 
+import jsonschema
 import pytest
 import yaml
 
@@ -46,6 +47,13 @@ def test_every_configuration_is_valid_on_top_of_the_default(path):
     settings = validate(merged(default, yaml.safe_load(path.read_text())), path.name)
     expected = "virtual-apple" if path.stem == "config" else path.stem
     assert settings.experiment == expected
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
+def test_editors_find_the_schema_of_every_configuration_and_nothing_wrong_with_it(path):
+    text = path.read_text()
+    assert text.splitlines()[0] == docs.SCHEMA
+    jsonschema.validate(yaml.safe_load(text), json.loads((docs.CONFIG / "schema.json").read_text()))
 
 
 def test_every_key_has_a_meaning_and_the_schema_refuses_others():

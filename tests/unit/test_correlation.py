@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 from scipy.stats import zscore
 
 from dapple.errors import InputError
-from dapple.stats import correlation, r_bridge
+from dapple.stats import correlation, measures, r_bridge
 
 
 def records(n_sensors=12, n_times=50, seed=0, sensor_sd=0.0, slope=1.0, intercept=0.0, noise=50.0):
@@ -138,8 +138,8 @@ def test_a_minute_by_minute_afternoon_is_resampled_in_seconds():
 def test_a_sensor_in_constant_light_has_no_r_but_an_error():
     data = records(n_sensors=2)
     data.loc[data["sensor"] == "1_0", "simulated"] = 0.1 + 0.2
-    table = correlation.per_sensor(data).set_index("sensor")
-    assert ",".join(correlation.per_sensor(data)) == "reconstruction,sensor,n,r,rmse,bias"
+    table = measures.per_sensor(data).set_index("sensor")
+    assert ",".join(measures.per_sensor(data)) == "reconstruction,sensor,n,r,rmse,bias"
     assert np.isnan(table.loc["1_0", "r"])
     assert np.isfinite(table.loc["1_0", ["rmse", "bias"]].astype(float)).all()
     assert table.loc["1_1", "r"] > 0.9

@@ -7,7 +7,7 @@ import xarray as xr
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
 from dapple.structure import occlusion
-from dapple.structure.voxels import CAPPED
+from dapple.structure.voxel_data import CAPPED
 
 SIZE, SHAPE, DENSITY, LEAF_M = 0.2, (10, 10, 10), 2.0, 0.05
 LEAF_M2 = 0.5 * LEAF_M**2

@@ -11,7 +11,7 @@ from dapple.formats.meshes import Mesh, empty
 from dapple.formats.shots import Shots
 from dapple.structure import summary
 from dapple.structure.polygons import reconstruct
-from dapple.structure.voxels import CAPPED
+from dapple.structure.voxel_data import CAPPED
 from dapple.verdict import signals, signals_light, signals_scan, signals_structure
 from dapple.verdict.run_data import RunData, points_per_polygon
 from dapple.verdict.signal_meanings import ABSENT, OF_RECORDS, SIGNALS

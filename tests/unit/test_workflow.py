@@ -4,8 +4,9 @@ from types import SimpleNamespace
 
 import pytest
 
+from dapple.code_use import SCRIPTS
 from dapple.errors import InputError
-from dapple.workflow import SCRIPTS, code_of, options, run
+from dapple.workflow import code_of, options, run
 
 
 def modules(script):
@@ -29,6 +30,17 @@ def test_the_code_of_polygons_is_no_part_of_what_comes_before_or_beside_them(scr
 @pytest.mark.parametrize("script", ["plant", "scan", "polygons", "voxels", "timesteps"])
 def test_the_typed_configuration_is_no_part_of_any_step(script):
     assert "config.py" not in modules(script)
+
+
+def test_an_engine_is_no_part_of_the_one_that_checks_it():
+    assert not {"light/tensor.py", "light/paths.py", "light/series.py"} & modules("timesteps")
+    assert not {"light/timestep.py", "light/timestep_series.py"} & modules("transport")
+
+
+def test_a_correction_that_is_turned_off_does_not_count():
+    assert "structure/occlusion.py" in modules("polygons")
+    left = code_of(SCRIPTS / "polygons.py", unused=["structure.occlusion"])
+    assert not any(path.endswith("structure/occlusion.py") for path in left)
 
 
 def test_r_code_counts_as_well():

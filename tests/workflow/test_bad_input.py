@@ -10,11 +10,11 @@ import pytest
 import xarray as xr
 import yaml
 
+from dapple.code_use import SCRIPTS
 from dapple.errors import InputError
 from dapple.formats import clouds, json, meshes
 from dapple.formats.clouds import Cloud
 from dapple.formats.meshes import Mesh
-from dapple.workflow import SCRIPTS
 
 CLOUD = {
     "experiment": "mine",
@@ -169,7 +169,13 @@ LEAF = Mesh(
     np.array([[0, 1, 2]], np.int32),
     np.zeros(1, np.int32),
 )
-SENSORS = {"kind": "table", "table": {}, "grid": {}, "ground_z_m": 0.0}
+SENSORS = {
+    "kind": "table",
+    "table": {},
+    "grid": {},
+    "ground_z_m": 0.0,
+    "origin_m": [0.0, 0.0, 0.0],
+}
 
 
 @pytest.mark.parametrize(
@@ -183,20 +189,30 @@ SENSORS = {"kind": "table", "table": {}, "grid": {}, "ground_z_m": 0.0}
 def test_a_sensor_where_none_can_be_is_named_with_its_table(tmp_path, position, found):
     table = tmp_path / "sensors.csv"
     table.write_text(f"label,X,Y,Z\n3_7,{position}\n")
-    meshes.write_ply(tmp_path / "leaves.ply", LEAF)
-    meshes.write_ply(tmp_path / "wood.ply", LEAF)
-    json.write(tmp_path / "registration.json", {"origin_m": [0.0, 0.0, 0.0]})
-    inputs = {
-        "table": table,
-        "registration": tmp_path / "registration.json",
-        "leaves": [tmp_path / "leaves.ply"],
-        "wood": tmp_path / "wood.ply",
-    }
-    job = rule(tmp_path, inputs, {"sensors": "out.csv"}, SENSORS)
+    for name in ("leaves.ply", "wood.ply"):
+        meshes.write_ply(tmp_path / name, LEAF)
+    placed = rule(
+        tmp_path,
+        {"table": table, "registration": "", "wood": ""},
+        {"sensors": "local.csv"},
+        SENSORS,
+    )
+    traced = rule(
+        tmp_path,
+        {name: tmp_path / f"{name}.ply" for name in ("leaves", "wood")}
+        | {"sensors": placed.output.sensors},
+        {"transport": "transport.nc"},
+        {"ground_z_m": 0.0, "sensor_table": str(table)},
+    )
+
+    def place_and_trace():
+        script("sensors").main(placed)
+        script("transport").main(traced)
+
     with pytest.raises(InputError, match=found) as error:
-        script("sensors").main(job)
+        place_and_trace()
     assert str(table) in str(error.value)
-    assert not (tmp_path / "out.csv").exists()
+    assert not (tmp_path / "transport.nc").exists()
 
 
 SKY = {
@@ -227,8 +243,7 @@ def test_radiation_at_naive_times_is_refused_and_the_zone_has_to_exist(tmp_path,
     table = tmp_path / "radiation.csv"
     rows = [f"2023-08-10 {hour}:00,700,100" for hour in (10, 11, 12, 13)]
     table.write_text("\n".join(["time,global_W_m2,diffuse_W_m2", *rows]))
-    json.write(tmp_path / "registration.json", {"clock_offset_s": 0.0})
-    inputs = {"radiation": table, "registration": tmp_path / "registration.json"}
+    inputs = {"radiation": table, "registration": ""}
     radiation = SKY["radiation"] | {"timezone": timezone}
     params = SKY | {"radiation": radiation, "atmosphere": {"model": "isotropic"}}
     with pytest.raises(InputError, match=found) as error:

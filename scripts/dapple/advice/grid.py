@@ -14,13 +14,14 @@ from dapple.advice.costs import Cost, least, repeated, timed
 from dapple.advice.geometries import Geometry
 from dapple.advice.pilot import light_and_costs
 from dapple.advice.tradeoff import PUBLISHED_S
-from dapple.light import series
-from dapple.light.light_model import DIRECT_SHARE, Model, Tracing
+from dapple.light.light_model import Model, Tracing
 from dapple.light.timestep_series import Reference
+from dapple.light.tolerances import DIRECT_SHARE
 from dapple.scene import traced
 from dapple.scene.scene_optics import Optics
 from dapple.scene.surfaces import Scene
 from dapple.scene.traced import TracedScene
+from dapple.sky.open_sky import open_sky_par
 from dapple.stats.agreement import rmse_rel
 
 FINEST_PATHS, FINEST_PATCHES = 65_536, 2305
@@ -79,7 +80,7 @@ class Grid:
     @cached_property
     def open_sky(self) -> np.ndarray:
         """(t,) PAR without a tree [µmol m⁻² s⁻¹]."""
-        return series.open_sky_par(self.sky).to_numpy()
+        return open_sky_par(self.sky).to_numpy()
 
     @property
     def finest_model(self) -> Model:

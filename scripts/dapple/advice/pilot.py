@@ -7,11 +7,11 @@ import xarray as xr
 
 from dapple import steps
 from dapple.advice.costs import PARTS, Cost, least, timed
-from dapple.light import series
 from dapple.light.light_model import Model, Tracing
 from dapple.light.series import Light
 from dapple.scene.scene_optics import Optics
 from dapple.scene.traced import TracedScene
+from dapple.sky.open_sky import open_sky_par
 from dapple.streams import stream_seed
 
 
@@ -62,7 +62,7 @@ def spread(n: int, count: int) -> np.ndarray:
 
 def daylight_times(sky: xr.Dataset, count: int) -> np.ndarray:
     """Indices of `count` times of a sky at which there is light, evenly spread."""
-    light = np.flatnonzero(series.open_sky_par(sky).to_numpy() > 0)
+    light = np.flatnonzero(open_sky_par(sky).to_numpy() > 0)
     return light[spread(len(light), count)]
 
 
@@ -134,7 +134,7 @@ class Pilot:
         self.sensors_m, self.sky, self.optics = sensors_m, sky, optics
         self.finest, self.tracing = finest, tracing
         self.repeats, self.seed = repeats, seed
-        self.open_sky = series.open_sky_par(sky).to_numpy()
+        self.open_sky = open_sky_par(sky).to_numpy()
 
     def light(self, scene: TracedScene, model: Model) -> tuple[Light, dict[str, Cost]]:
         """Light of a model and its cost with kernels that are compiled already."""

@@ -13,10 +13,10 @@ from dapple import steps
 from dapple.advice.costs import repeated
 from dapple.advice.pilot import Effect, Pilot
 from dapple.formats.netcdf import time_coordinate, times
-from dapple.light import series
 from dapple.light.series import Light
 from dapple.light.visibility import Sunlit
 from dapple.scene.traced import TracedScene
+from dapple.sky.open_sky import open_sky_par
 from dapple.sky.sun import position
 
 LEVELS = {
@@ -161,7 +161,7 @@ def _share_of_beam(
     sky: xr.Dataset, stamps: pd.DatetimeIndex, wanted: pd.DatetimeIndex
 ) -> np.ndarray:
     """Direct light on the level as a share of open-sky PAR."""
-    total = series.open_sky_par(sky).to_numpy()
+    total = open_sky_par(sky).to_numpy()
     diffuse = sky["diffuse_horizontal_umol_m2_s"].sum("band").to_numpy()
     share = np.where(total > 0, 1 - diffuse / np.where(total > 0, total, 1), 0)
     return np.interp(wanted.as_unit("ns").asi8, stamps.as_unit("ns").asi8, share)

@@ -14,11 +14,14 @@ from dapple.formats.atomic import atomic
 
 CONFIG = Path(__file__).parents[3] / "config"
 MEND = "make docs"
+SCHEMA = "# yaml-language-server: $schema=schema.json"
+"""By this first line editors complete and check the keys of a file in `config/`."""
 
 
 def default_yaml() -> str:
     """The default configuration as commented YAML."""
     lines = [
+        SCHEMA,
         "# The default run: a virtual apple tree, scanned, rebuilt and lit.",
         f"# Every key with unit, range and source: config/README.md. Made by `{MEND}`.",
         "",
@@ -64,6 +67,9 @@ def readme() -> str:
         "`--configfile` and with `--config key=value`. A file needs only the keys that differ. The",
         "merged configuration is written to `results/{experiment}/config.yaml`. Units are part of",
         "the names.",
+        "",
+        "Editors with a YAML language server complete and check keys in a file here that begins",
+        f"with `{SCHEMA}`.",
         "",
         "This page, `config.yaml` and `schema.json` are made from `scripts/dapple/config/` by",
         f"`{MEND}`.",

@@ -32,6 +32,7 @@ class Timestep(Section):
     """The per-timestep engine: Mitsuba's own integrators, the independent check."""
 
     step_min: Positive = key(10.0, "minutes between its times, a multiple of time.step_min")
+    times_per_job: Count = key(60, "times that one job computes, in one file")
     bands: Literal[1, 3] = key(3, "groups of bands, traced together")
     replicates: Annotated[int, Ge(2)] = key(16, "independent repetitions: the standard error")
     direct_rays: Count = key(64, "rays to the sun, per sensor, time and replicate")

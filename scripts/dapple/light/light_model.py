@@ -6,14 +6,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from dapple.light.tolerances import DIRECT_SHARE, PATH_SHARE
 from dapple.light.visibility import Sunlit
 from dapple.scene.scene_optics import Optics, group_bands, group_flux
 from dapple.scene.surfaces import GROUND
 
 FLUXES = ("beam_normal_umol_m2_s", "diffuse_horizontal_umol_m2_s")
-DIRECT_SHARE, PATH_SHARE = 0.8, 0.35
-"""How a tolerance is shared out between shadow rays and paths, with a margin: the real sky is not
-the nominal one by which the number of paths is judged."""
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ import numpy as np
 import xarray as xr
 
 from dapple.light import visibility
-from dapple.light.series import level_beam, towards_sun
 from dapple.scene.traced import TracedScene
+from dapple.sky.open_sky import level_beam, towards_sun
 
 
 def sideways(places_m: np.ndarray, distance_m: float, seed: int) -> np.ndarray:

@@ -4,46 +4,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 
-from dapple.formats.netcdf import time_coordinate
-from dapple.frames import direction_from_angles
 from dapple.light.tensor import Transport, straight, summed_scattered, sun_radiance
 from dapple.light.visibility import Sunlit
 from dapple.scene.scene_optics import Optics
+from dapple.sky.open_sky import level_beam, towards_sun
 from dapple.sky.patches import patches
 from dapple.sky.sky_radiance import patch_radiance
 
 VALUES_AT_ONCE = 1 << 22
 """Bounds memory: values of sensors, replicates and times that are held together."""
-PARTS = {
-    "par_umol_m2_s": "photosynthetically active radiation",
-    "par_direct_umol_m2_s": "PAR straight from the sun",
-    "par_sky_umol_m2_s": "PAR straight from the sky",
-    "par_scattered_umol_m2_s": "PAR scattered by leaves, bark and ground",
-    "standard_error_umol_m2_s": "standard error of PAR",
-}
-
-
-def towards_sun(sky: xr.Dataset) -> np.ndarray:
-    """(t, 3) unit vectors towards the sun at the times of a sky dataset."""
-    return direction_from_angles(
-        sky["sun_zenith_deg"].to_numpy(), sky["sun_azimuth_deg"].to_numpy()
-    )
-
-
-def open_sky_par(sky: xr.Dataset) -> xr.DataArray:
-    """Horizontal PAR without a tree at the times of a sky dataset [µmol m⁻² s⁻¹]."""
-    upward = np.maximum(np.cos(np.radians(sky["sun_zenith_deg"])), 0)
-    beam = sky["beam_normal_umol_m2_s"].sum("band")
-    return beam * upward + sky["diffuse_horizontal_umol_m2_s"].sum("band")
-
-
-def level_beam(sky: xr.Dataset) -> np.ndarray:
-    """(t,) PAR straight from the sun on level ground without a tree [µmol m⁻² s⁻¹]."""
-    upward = np.maximum(np.cos(np.radians(sky["sun_zenith_deg"].to_numpy())), 0)
-    return sky["beam_normal_umol_m2_s"].sum("band").to_numpy() * upward
 
 
 @dataclass(frozen=True)
@@ -150,30 +121,3 @@ def mean(placements: Sequence[Light]) -> Light:
     )
     spread = np.std([p.par for p in placements], axis=0, ddof=1)
     return Light(*parts, standard_error=spread / np.sqrt(len(placements)))
-
-
-def as_dataset(light: Light, sensors: Sequence[str], when: pd.DatetimeIndex) -> xr.Dataset:
-    """Light of labelled sensors at t times as files have it."""
-    parts = {name: getattr(light, name) for name in ("direct", "sky", "scattered")}
-    return dataset(list(sensors), when, par=light.par, standard_error=light.standard_error, **parts)
-
-
-def dataset(
-    sensors: list[str],
-    when: pd.DatetimeIndex,
-    *,
-    par: np.ndarray,
-    direct: np.ndarray,
-    sky: np.ndarray,
-    scattered: np.ndarray,
-    standard_error: np.ndarray,
-) -> xr.Dataset:
-    """Light at sensors and times, arrays of shape (n_sensors, t), as a dataset."""
-    values = (par, direct, sky, scattered, standard_error)
-    return xr.Dataset(
-        {
-            name: (("sensor", "time"), value, {"units": "µmol m-2 s-1", "long_name": text})
-            for (name, text), value in zip(PARTS.items(), values, strict=True)
-        },
-        coords={"sensor": sensors, "time": time_coordinate(when)},
-    )

@@ -1,16 +1,14 @@
-"""The per-timestep engine over a whole day, one cached file a timestep."""
+"""The per-timestep engine over a whole day."""
 
-import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterable
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
 from dapple.formats import netcdf
-from dapple.light.series import dataset
+from dapple.light.light_datasets import dataset
 from dapple.light.timestep import Effort, timestep
 from dapple.scene import mitsuba_scene
 from dapple.scene.render_scene import RenderScene
@@ -65,11 +63,6 @@ class Reference:
         self.sun_diameter_deg, self.aperture_m = sun_diameter_deg, aperture_m
         self.variant = variant
 
-    @property
-    def settings(self) -> tuple:
-        """What a timestep depends on besides geometry, spectra and sky."""
-        return (self.effort, self.n_bands, self.sun_diameter_deg, self.aperture_m, self.seed)
-
     @cached_property
     def rendered(self) -> list[RenderScene]:
         """The scenes as Mitsuba has them."""
@@ -114,54 +107,15 @@ class Reference:
         )
 
 
+def joined(parts: Iterable[xr.Dataset]) -> xr.Dataset:
+    """Light of some times after that of others, as one series."""
+    return xr.concat(
+        list(parts), "time", data_vars="minimal", coords="minimal", combine_attrs="drop_conflicts"
+    )
+
+
 def _standard_error(parts: list[dict[str, np.ndarray]]) -> np.ndarray:
     """Of the mean over placements; of the rays alone where there is one placement."""
     if len(parts) == 1:
         return parts[0]["par_standard_error"]
     return np.std([part["par"] for part in parts], axis=0, ddof=1) / np.sqrt(len(parts))
-
-
-def run_all(
-    reference: Reference, sensors: pd.DataFrame, paths: Sequence[str], inputs: Sequence[str]
-) -> int:
-    """Compute the timesteps whose files are missing or were made from something else.
-
-    Parameters
-    ----------
-    reference : Reference
-        The engine.
-    sensors : pandas.DataFrame
-        In the local frame.
-    paths : sequence of path
-        One NetCDF file for each time of the sky.
-    inputs : sequence of path
-        Files of geometry, whose contents count for the digest that a timestep carries.
-
-    Returns
-    -------
-    int
-        How many were computed.
-    """
-    common = hashlib.sha256()
-    for path in inputs:
-        common.update(Path(path).read_bytes())
-    common.update(sensors.to_csv().encode())
-    common.update(repr(reference.settings).encode())
-    for kind in (reference.optics.reflectance, reference.optics.transmittance):
-        for name, values in kind.items():
-            common.update(name.encode() + np.ascontiguousarray(values).tobytes())
-    computed = 0
-    for index, path in enumerate(paths):
-        digest = common.copy()
-        for _, variable in sorted(reference.sky.isel(time=index).data_vars.items()):
-            digest.update(np.ascontiguousarray(variable).tobytes())
-        if _is_current(Path(path), digest.hexdigest()):
-            continue
-        netcdf.write(path, reference.at(index, sensors).assign_attrs(inputs=digest.hexdigest()))
-        computed += 1
-        print(f"{path}: computed", flush=True)
-    return computed
-
-
-def _is_current(path: Path, digest: str) -> bool:
-    return path.is_file() and netcdf.read(path).attrs.get("inputs") == digest

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from dapple.errors import InputError
-from dapple.stats.correlation import pearson
+from dapple.stats.measures import pearson
 
 CANDIDATES = ["level", "east_m", "north_m", "clock_offset_s", "r"]
 

@@ -8,9 +8,9 @@ import pandas as pd
 import xarray as xr
 
 from dapple.light import rays_to_sky
-from dapple.light.series import towards_sun
 from dapple.registration import fit
 from dapple.scene.surfaces import Scene
+from dapple.sky.open_sky import towards_sun
 
 FINE_STEP_S = 120.0
 """Times of the simulated shade; the sun moves by half its disc in a minute."""

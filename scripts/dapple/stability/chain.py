@@ -21,6 +21,7 @@ from dapple.light.moved_sensors import sideways
 from dapple.light.series import Light
 from dapple.scene import scene_optics, traced
 from dapple.scene.traced import TracedScene
+from dapple.sky.open_sky import open_sky_par
 from dapple.stability import structures, world
 from dapple.stability.stressors import STAGES, UNDISTURBED, Conditions, key
 from dapple.stability.structures import Structure
@@ -225,7 +226,7 @@ class Chain:
 
     def open_sky(self, conditions: Conditions) -> np.ndarray:
         """(t,) PAR without a tree, by the right clock [µmol m⁻² s⁻¹]."""
-        return series.open_sky_par(self.sky(true_conditions(conditions))).to_numpy()
+        return open_sky_par(self.sky(true_conditions(conditions))).to_numpy()
 
 
 STAGE_OF = {

@@ -10,7 +10,7 @@ from dapple.cloud.scores import scores
 from dapple.errors import InputError
 from dapple.formats.meshes import empty
 from dapple.formats.netcdf import times
-from dapple.light import series
+from dapple.light import light_datasets
 from dapple.light.series import Light
 from dapple.stability.chain import Chain, true_conditions
 from dapple.stability.stressors import Conditions, Level, Stressor
@@ -178,13 +178,13 @@ def run_data(
     stamps, sensors_m = times(chain.sky(true_conditions(conditions))), chain.sensors_m(conditions)
     labels = [str(number) for number in range(len(sensors_m))]
     recorded = simulate(
-        series.as_dataset(truth, labels, stamps), seed=stream_seed(chain.seed, "records")
+        light_datasets.as_dataset(truth, labels, stamps), seed=stream_seed(chain.seed, "records")
     )
     recorded["time"] = recorded["time"].dt.tz_localize(None)  # as in datasets
     tracing = chain.setup.light["tracing"]
     return with_light(
         run,
-        {name: series.as_dataset(own, labels, stamps) for name, own in light.items()},
+        {name: light_datasets.as_dataset(own, labels, stamps) for name, own in light.items()},
         lambda name: chain.loaded(name, conditions),
         sensors_m=sensors_m,
         sky=chain.sky(conditions),

@@ -1,8 +1,6 @@
-"""How well simulated light follows measured light: r and its interval, errors, a mixed model.
+"""How well all records of a reconstruction follow what was measured: intervals and models, by R.
 
-Records are a table with one row per reconstruction, sensor and time: columns `reconstruction`,
-`sensor`, `time`, `measured`, `simulated` and, where there is one, `baseline` (the same sky without
-a tree). Light is PAR [µmol m⁻² s⁻¹]. A record with a missing number counts nowhere.
+Records as in `dapple.stats.measures`.
 """
 
 import logging
@@ -12,12 +10,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from dapple.errors import InputError
 from dapple.stats import r_bridge
+from dapple.stats.measures import by_reconstruction, mean, pearson
 
 R_FILE = Path(__file__).with_suffix(".R")
 OVERALL = ["reconstruction", "n", "r", "r_low", "r_high", "rmse", "bias", "mae", "baseline_r"]
-PER_SENSOR = ["reconstruction", "sensor", "n", "r", "rmse", "bias"]
 MODEL = [
     "intercept",
     "intercept_se",
@@ -48,17 +45,6 @@ class Interval:
     note: str = ""
 
 
-def pearson(x: np.ndarray, y: np.ndarray) -> float:
-    """Pearson's r of two arrays; NaN where one of them is constant or has fewer than two values."""
-    if len(x) < 2:
-        return np.nan
-    dx, dy = x - np.mean(x), y - np.mean(y)
-    # Constant up to rounding is constant: 1e-12 of the values is far below any sensor.
-    if np.ptp(x) <= 1e-12 * np.abs(x).max() or np.ptp(y) <= 1e-12 * np.abs(y).max():
-        return np.nan
-    return float(np.clip(dx @ dy / np.sqrt((dx @ dx) * (dy @ dy)), -1.0, 1.0))
-
-
 def overall(
     records: pd.DataFrame,
     *,
@@ -86,7 +72,7 @@ def overall(
         simulated minus measured; `rmse`, `bias`, `mae` in the records' unit. Undefined is NaN.
     """
     rows = []
-    for reconstruction, group in _reconstructions(records):
+    for reconstruction, group in by_reconstruction(records):
         limits = bootstrap_interval(
             group, seed=seed, n_bootstrap=n_bootstrap, confidence=confidence
         )
@@ -101,40 +87,13 @@ def overall(
                 "r": pearson(measured, simulated),
                 "r_low": limits.low,
                 "r_high": limits.high,
-                "rmse": _mean(difference**2) ** 0.5,
-                "bias": _mean(difference),
-                "mae": _mean(np.abs(difference)),
+                "rmse": mean(difference**2) ** 0.5,
+                "bias": mean(difference),
+                "mae": mean(np.abs(difference)),
                 "baseline_r": _baseline_r(group),
             }
         )
     return pd.DataFrame(rows, columns=OVERALL)
-
-
-def per_sensor(records: pd.DataFrame) -> pd.DataFrame:
-    """Agreement of each sensor's series, one row per reconstruction and sensor.
-
-    Returns
-    -------
-    DataFrame
-        `reconstruction, sensor, n, r, rmse, bias`; r is NaN (an empty cell in a file) where the
-        measured or the simulated series is constant.
-    """
-    rows = []
-    for reconstruction, group in _reconstructions(records):
-        for sensor, series in group.groupby("sensor", sort=True):
-            measured, simulated = series["measured"].to_numpy(), series["simulated"].to_numpy()
-            difference = simulated - measured
-            rows.append(
-                {
-                    "reconstruction": reconstruction,
-                    "sensor": sensor,
-                    "n": len(series),
-                    "r": pearson(measured, simulated),
-                    "rmse": _mean(difference**2) ** 0.5,
-                    "bias": _mean(difference),
-                }
-            )
-    return pd.DataFrame(rows, columns=PER_SENSOR)
 
 
 def mixed_model(records: pd.DataFrame) -> pd.DataFrame:
@@ -155,7 +114,7 @@ def mixed_model(records: pd.DataFrame) -> pd.DataFrame:
     `overall`, which resamples whole sensors, is the one to trust.
     """
     rows = []
-    for reconstruction, group in _reconstructions(records):
+    for reconstruction, group in by_reconstruction(records):
         row = {"reconstruction": reconstruction, "n": len(group)}
         row |= {"n_sensors": group["sensor"].nunique(), "note": _why_no_model(group)}
         if row["note"]:
@@ -220,18 +179,6 @@ def _sums(records: pd.DataFrame) -> pd.DataFrame:
     return terms.groupby(records["sensor"], sort=True)[SUMS].sum().reset_index(drop=True)
 
 
-def _reconstructions(records: pd.DataFrame):
-    """Complete records of each reconstruction, in the order of first appearance."""
-    needed = ["reconstruction", "sensor", "time", "measured", "simulated"]
-    if missing := [name for name in needed if name not in records]:
-        raise InputError(
-            "records", f"columns {list(records)}", f"columns {needed}", f"Add {', '.join(missing)}."
-        )
-    for reconstruction, group in records.groupby("reconstruction", sort=False, observed=True):
-        complete = np.isfinite(group[["measured", "simulated"]].to_numpy(float)).all(axis=1)
-        yield reconstruction, group[complete].astype({"measured": float, "simulated": float})
-
-
 def _baseline_r(records: pd.DataFrame) -> float:
     if "baseline" not in records:
         return np.nan
@@ -248,7 +195,3 @@ def _why_no_model(records: pd.DataFrame) -> str:
     if np.isnan(pearson(records["measured"].to_numpy(), records["simulated"].to_numpy())):
         return "the measured or the simulated values are constant"
     return ""
-
-
-def _mean(values: np.ndarray) -> float:
-    return float(values.mean()) if len(values) else np.nan

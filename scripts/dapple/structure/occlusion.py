@@ -13,7 +13,7 @@ from scipy.spatial import ConvexHull, Delaunay, QhullError, cKDTree
 
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
-from dapple.structure.voxels import CAPPED
+from dapple.structure.voxel_data import CAPPED
 
 
 def correct(

@@ -21,10 +21,8 @@ from dapple.structure.traversal import (
     next_facet,
     start_march,
 )
-from dapple.structure.voxels import CAPPED
+from dapple.structure.voxel_data import CAPPED, DENSITY, ESTIMATED
 
-DENSITY = "plant_area_density_m2_m3"
-ESTIMATED = "plant_area_density_estimated_m2_m3"
 """What was estimated, kept beside the effective density in corrected voxels."""
 
 
@@ -105,13 +103,6 @@ def correct(
     before = voxel_area_m2(voxels)
     corrected.attrs |= {"clumping_index": index, "leaf_area_before_m2": before}
     return corrected
-
-
-def as_estimated(voxels: xr.Dataset) -> xr.Dataset:
-    """Voxels with the density that was estimated, whether they were corrected or not."""
-    if ESTIMATED not in voxels:
-        return voxels
-    return voxels.assign({DENSITY: voxels[ESTIMATED]}).drop_vars(ESTIMATED)
 
 
 def uncapped(voxels: xr.Dataset) -> np.ndarray:

@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 from dapple.formats.meshes import Mesh
-from dapple.structure.voxels import CAPPED
+from dapple.structure.voxel_data import CAPPED
 
 
 def of_meshes(leaves: Mesh, wood: Mesh, truth: dict | None = None) -> dict:

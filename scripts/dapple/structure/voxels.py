@@ -10,10 +10,8 @@ from dapple.formats.shots import Shots
 from dapple.structure import densities, traversal
 from dapple.structure.pad_estimators import ESTIMATORS
 from dapple.structure.returns import Kinds
+from dapple.structure.voxel_data import CAPPED, NOT_REACHED, TOO_FEW_SHOTS
 from dapple.structure.voxel_sums import Grid, Sums, accumulate
-
-NOT_REACHED, TOO_FEW_SHOTS, CAPPED = 1, 2, 4
-"""Bits of the variable `flag`."""
 
 
 def plant_area_density(

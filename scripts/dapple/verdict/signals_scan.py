@@ -10,8 +10,8 @@ from scipy.spatial import cKDTree
 from dapple.formats.clouds import LEAF, Cloud
 from dapple.formats.shots import Shots
 from dapple.structure import occlusion
+from dapple.structure.voxel_data import DENSITY
 
-DENSITY = "plant_area_density_m2_m3"
 PATCH_M2 = 0.001
 """Projected patch of leaf whose chance of being met measures coverage: about 4 cm by 5 cm, seen
 at the mean projection of one half."""

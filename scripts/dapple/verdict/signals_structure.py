@@ -9,9 +9,7 @@ from scipy.spatial import cKDTree
 from dapple.formats.clouds import LEAF, Cloud
 from dapple.formats.meshes import Mesh
 from dapple.structure import occlusion
-from dapple.structure.voxels import CAPPED
-
-DENSITY = "plant_area_density_m2_m3"
+from dapple.structure.voxel_data import CAPPED, DENSITY
 
 
 def capped_share(voxels: xr.Dataset) -> float:

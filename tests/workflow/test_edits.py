@@ -1,0 +1,195 @@
+"""Each edit reruns exactly what depends on it: keys, code and data against the jobs to rerun.
+
+Jobs are counted, as in `transport*3`: of four reconstructions three are traced again.
+"""
+
+import os
+from collections import Counter
+
+import pytest
+import yaml
+from tests.workflow import dry_runs
+from tests.workflow.project import SMALL, copy_of_project
+
+# What follows from what.
+PAGE = "runtime page"
+CONFIGURED = f"configuration {PAGE}"
+COMPARED = "records statistics comparison_figures series_figure verdict"
+
+
+def checked(n):
+    """The per-timestep engine in n reconstructions, each in two batches."""
+    return f"timesteps*{2 * n} reference*{n} agreement"
+
+
+def traced(n):
+    """Both engines in n reconstructions, and what compares them."""
+    return f"transport*{n} light*{n} {checked(n)} {COMPARED}"
+
+
+MAP = "ground_map ground_map_figure"
+SHAPED = f"{MAP} cloud_to_mesh voxels_summary*2 tree_figure"
+POLYGONS = f"polygons {SHAPED}"
+CLASSES = f"classify {POLYGONS} voxels*2 {traced(3)}"
+SCAN = f"scan clean {CLASSES}"
+PLANT = f"plant scan clean classify {POLYGONS} voxels*2 sensors {traced(4)}"  # the truth as well
+SKY = f"light*4 {checked(4)} {MAP} {COMPARED}"
+OWN_CHECK = f"{checked(4)} {MAP}"
+
+KEYS = {
+    "plant={leaf_area_m2: 6}": PLANT,
+    "scan={positions: 4}": SCAN,
+    "clean={thin_voxel_m: 0.02}": f"clean {CLASSES}",
+    "clean={distance_points: 1000}": "cloud_to_mesh",
+    "classify={threshold_db: -5}": CLASSES,
+    "polygons={voxel_size_m: 0.06}": f"{POLYGONS} {traced(3)}",
+    "voxels={estimator: ppl}": f"voxels*2 voxels_summary*2 {traced(2)}",
+    "corrections={clumping: true}": f"voxels*2 voxels_summary*2 {traced(2)}",
+    "radiation={linke_turbidity: 4}": f"sky {SKY}",
+    "optics={leaf: {chlorophyll_ug_cm2: 30}}": f"optics {SKY}",
+    "site={timezone: UTC}": "series_figure",
+    "time={end: 2023-08-10 16:30}": f"sky {SKY}",
+    "sensors={height_m: 0.2}": f"sensors tree_figure {traced(4)}",
+    "measured={noise_relative: 0.03}": COMPARED,
+    "registration={origin_m: [1, 0, 0]}": "",  # a grid stands in the tree's own frame
+    "light={transport: {max_orders: 8}}": f"transport*4 light*4 agreement {COMPARED}",
+    "light={transport: {max_shadow_rays: 99}}": f"light*4 agreement {COMPARED}",
+    "light={timestep: {replicates: 5}}": OWN_CHECK,
+    "light={timestep: {step_min: 120}}": "timesteps*4 reference*4 agreement",
+    "light={sun_diameter_deg: 0.5}": SKY,
+    "ground_z_m=-0.1": f"scan clean {CLASSES} sensors".replace(traced(3), traced(4)),
+    "statistics={confidence: 0.9}": "statistics comparison_figures",
+    "figures={map_spacing_m: 0.4}": MAP,
+    "figures={sensors: [1_1]}": "series_figure",
+    "survey={grown: 3}": "",
+    "seed=2": PLANT,
+}
+CODE = {
+    "virtual/plants.py": PLANT,
+    "virtual/scanner.py": SCAN,
+    "cloud/clean.py": f"clean {CLASSES}",
+    "structure/polygons.py": f"{POLYGONS} {traced(3)}",
+    "structure/voxels.py": f"voxels*2 voxels_summary*2 {traced(2)}",
+    "structure/occlusion.py": "verdict",  # the correction is turned off
+    "sky/sun.py": f"sky {SKY}",
+    "scene/sensors.py": f"sensors tree_figure {traced(4)}",
+    "light/paths.py": f"transport*4 light*4 agreement {COMPARED}",
+    "light/series.py": f"light*4 agreement {COMPARED}",
+    "light/timestep.py": OWN_CHECK,
+    "light/moved_sensors.py": "verdict",
+    "registration/fit.py": "",  # nothing is fitted
+    "stats/correlation.R": "statistics comparison_figures",
+    "stats/agreement.py": "agreement",
+    "verdict/verdict_model.json": "verdict",
+    "figures/tree.py": "tree_figure",
+    "figures/report.py": "page",
+    "config/polygons.py": "",  # what it configures counts, not how it is read
+    "survey/plan.py": "",
+}
+DATA = {
+    "sensors.csv": f"sensors tree_figure {traced(4)}",
+    "par.csv": COMPARED,
+    "radiation.csv": f"sky {SKY}",
+    "bark.csv": f"optics {SKY}",
+}
+TABLES = {
+    "experiment": "tables",
+    "data_dir": ".",
+    "sensors": {"kind": "table", "path": "sensors.csv"},
+    "measured": {"kind": "table", "path": "par.csv"},
+    "radiation": {"kind": "table", "path": "radiation.csv"},
+    "optics": {"bark": {"path": "bark.csv"}},
+}
+
+
+def counted(text):
+    """Jobs as they are written above."""
+    words = (word.partition("*") for word in text.split())
+    return Counter({rule: int(number or 1) for rule, _, number in words})
+
+
+def planned(output):
+    """Jobs of a dry run, from Snakemake's table."""
+    lines = iter(output.splitlines())
+    if not any(line.split() == ["job", "count"] for line in lines):
+        return Counter()
+    next(lines)
+    rows = (line.split() for line in lines)
+    jobs = {}
+    for row in rows:
+        if len(row) != 2 or row[0] == "total":
+            break
+        jobs[row[0]] = int(row[1])
+    jobs.pop("all")
+    return Counter(jobs)
+
+
+def dry(configfile, *config):
+    overrides = ["--config", *config] if config else []
+    configured = ["--cores", "1", "--nocolor", "--configfile", configfile, *overrides]
+    return ["--dry-run", "--quiet", "rules", *configured]
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A copy of the project that looks as after a run of the small tree."""
+    project = copy_of_project(tmp_path_factory.mktemp("finished") / "dapple")
+    dry_runs.pretend_finished(project.folder, SMALL)
+    return project.folder
+
+
+@pytest.fixture(scope="module")
+def with_tables(tmp_path_factory):
+    """The same with sensors, records, radiation and bark from files."""
+    project = copy_of_project(tmp_path_factory.mktemp("tables") / "dapple")
+    small = yaml.safe_load((project.folder / SMALL).read_text())
+    (project.folder / "tables.yaml").write_text(yaml.safe_dump(small | TABLES))
+    for name in DATA:
+        (project.folder / name).write_text("as it was\n")
+    dry_runs.pretend_finished(project.folder, "tables.yaml")
+    return project.folder
+
+
+def with_edits(folder, files, configfile):
+    """Jobs after each file alone was edited: a line more at its end."""
+    found = {}
+    for name, path in files.items():
+        before, stat = path.read_bytes(), path.stat()
+        path.write_bytes(before + b"\n")
+        (output,) = dry_runs.many([(folder, dry(configfile))])
+        found[name] = planned(output)
+        path.write_bytes(before)
+        os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+    return found
+
+
+def differences(found, expected, everywhere):
+    """What reruns though it should not, and what should but does not, by edit."""
+    wrong = {}
+    for name, jobs in found.items():
+        wanted = counted(f"{expected[name]} {everywhere if expected[name] else ''}")
+        wanted |= counted(everywhere if everywhere == CONFIGURED else "")
+        if jobs != wanted:
+            wrong[name] = {"too much": dict(jobs - wanted), "too little": dict(wanted - jobs)}
+    return wrong
+
+
+def test_nothing_was_edited_and_nothing_is_to_be_done(finished, with_tables):
+    runs = [(finished, dry(SMALL)), (with_tables, dry("tables.yaml"))]
+    assert [planned(output) for output in dry_runs.many(runs)] == [Counter(), Counter()]
+
+
+def test_an_edited_key_reruns_what_depends_on_it_and_nothing_else(finished):
+    outputs = dry_runs.many((finished, dry(SMALL, edit)) for edit in KEYS)
+    found = {edit: planned(output) for edit, output in zip(KEYS, outputs, strict=True)}
+    assert differences(found, KEYS, CONFIGURED) == {}
+
+
+def test_edited_code_reruns_what_depends_on_it_and_nothing_else(finished):
+    files = {name: finished / "scripts/dapple" / name for name in CODE}
+    assert differences(with_edits(finished, files, SMALL), CODE, PAGE) == {}
+
+
+def test_edited_data_rerun_what_depends_on_them_and_nothing_else(with_tables):
+    files = {name: with_tables / name for name in DATA}
+    assert differences(with_edits(with_tables, files, "tables.yaml"), DATA, PAGE) == {}
