@@ -82,7 +82,7 @@ CODE = {
     "stats/agreement.py": "agreement",
     "verdict/verdict_model.json": "verdict",
     "figures/tree.py": "tree_figure",
-    "figures/report.py": "page",
+    "figures/scatter.py": "comparison_figures",
     "config/polygons.py": "",  # what it configures counts, not how it is read
     "survey/plan.py": "",
 }
