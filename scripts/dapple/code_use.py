@@ -123,18 +123,36 @@ def _uses(statement: ast.stmt, source: Source) -> set[Use]:
     """Names that a statement mentions; what it imports itself is added to the source's imports."""
     found: set[Use] = set()
     with_attribute = set()
-    for node in ast.walk(statement):
+    for node, parameters in _within(statement):
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
-            found.add((node.value.id, node.attr))
+            if node.value.id not in parameters:
+                found.add((node.value.id, node.attr))
             with_attribute.add(node.value)
         elif isinstance(node, ast.Name) and node not in with_attribute:
-            found.add((node.id, WHOLE))
+            if node.id not in parameters:
+                found.add((node.id, WHOLE))
         elif isinstance(node, ast.Import | ast.ImportFrom):
             # Known in this statement alone: a neighbour may call something else by that name.
             inside = {f"{name} {node.lineno}": of for name, of in _imported(node).items()}
             source.imports.update(inside)
             found |= {(name, WHOLE) for name in inside}
     return found
+
+
+def _within(
+    node: ast.AST, parameters: frozenset[str] = frozenset()
+) -> Iterator[tuple[ast.AST, frozenset[str]]]:
+    """A node and all below it, each with the parameters that hide names of the module there."""
+    yield node, parameters
+    if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+        own = {arg.arg for arg in ast.walk(node.args) if isinstance(arg, ast.arg)}
+        body = node.body if isinstance(node.body, list) else [node.body]
+        for part in ast.iter_child_nodes(node):
+            hidden = parameters | own if part in body else parameters
+            yield from _within(part, hidden)
+    else:
+        for part in ast.iter_child_nodes(node):
+            yield from _within(part, parameters)
 
 
 def _imported(node: ast.Import | ast.ImportFrom) -> dict[str, tuple[Path, str | None]]:

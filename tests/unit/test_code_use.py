@@ -91,3 +91,8 @@ def test_what_is_turned_off_is_not_followed(reached, tmp_path):
     reached("from dapple.two import a, b\na(b)", two=TWO, **LEAVES)
     found = code_use.files_of(tmp_path / "rule.py", unused=["second"])
     assert {path.stem for path in found} == {"two", "first"}
+
+
+def test_a_parameter_is_not_the_neighbour_of_its_name(reached):
+    text = "from dapple import first\ndef a(b, *, c=0):\n    return b.x, c\ndef b(): first.f()\n"
+    assert reached("from dapple.some import a\na(1)", some=text, **LEAVES) == {"some"}
