@@ -53,7 +53,7 @@ def chlorophyll_targets():
 
 
 def stability_targets():
-    """Where methods fail, as tables and pictures."""
+    """Where reconstructions fail, as tables and pictures."""
     return [
         "stability/points.csv",
         "stability/thresholds.csv",

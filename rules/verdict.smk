@@ -46,7 +46,7 @@ rule verdict:
     resources:
         mem_mb=4000,
     params:
-        methods=JUDGED,
+        reconstructions=JUDGED,
         polygon_voxel_m=(
             settings.polygons.voxel_size_m if settings.source != "wood" else None
         ),

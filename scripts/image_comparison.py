@@ -20,7 +20,7 @@ def main(snakemake):
     drawn, properties = spectra.combinations(
         params.leaves_and_soils, params.direct_renders, seed=params.seed
     )
-    reference, render_s, render_paths = image_methods.direct(
+    reference, render_s, render_paths = image_methods.render_all(
         Renderer(scene, variant=params.variant),
         traced,
         properties,

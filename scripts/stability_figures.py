@@ -1,4 +1,4 @@
-"""The map of where methods fail, and its curves."""
+"""The map of where reconstructions fail, and its curves."""
 
 from dapple.figures import stability_map, style
 from dapple.formats import tables

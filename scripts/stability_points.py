@@ -1,4 +1,4 @@
-"""All runs in one table, with the verdict on each; where methods fail; the published findings."""
+"""All runs in one table with the verdict on each; where they fail; the published findings."""
 
 import pandas as pd
 

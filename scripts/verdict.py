@@ -16,9 +16,11 @@ def main(snakemake):
     found = scanned(inputs, params)
     if inputs.light:
         found = lighted(found, inputs, params)
-    judged = judgement.judge(signals.measure(found), tuple(params.methods))
+    judged = judgement.judge(signals.measure(found), tuple(params.reconstructions))
     json.write(snakemake.output.verdict, judged)
-    print(judged["state"], {name: facts["state"] for name, facts in judged["methods"].items()})
+    print(
+        judged["state"], {name: facts["state"] for name, facts in judged["reconstructions"].items()}
+    )
 
 
 def scanned(inputs, params):

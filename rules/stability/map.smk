@@ -1,11 +1,11 @@
 """
-Map: where methods fail, and which signals give it away.
+Map: where reconstructions fail, and which signals give it away.
 
 Needs   stability/batches/
 Makes   stability/points.csv              all runs: agreement with the truth, signals, verdict
-        stability/thresholds.csv          from which level on a method has failed
+        stability/thresholds.csv          from which level on a reconstruction has failed
         stability/published.csv           where the published findings hold in these worlds
-        stability/map.png, curves.png     by stressor, level and method
+        stability/map.png, curves.png     by stressor, level and reconstruction
         stability/verdict_model.json, verdict.csv   fitted to these runs; detection and false alarms
 """
 

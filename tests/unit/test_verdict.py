@@ -10,11 +10,11 @@ import pytest
 from dapple import findings
 from dapple.figures import report
 from dapple.verdict import fitting, judgement
-from dapple.verdict.departure import MOST, suspicion
+from dapple.verdict.departure import MOST, departure
 from dapple.verdict.signal_meanings import OF_RECORDS, SIGNALS
 
 MOVES = (0.0, 0.2, 0.4, 1.6, 2.0)
-METHODS = ("polygons", "voxels_1.0")
+RECONSTRUCTIONS = ("polygons", "voxels_1.0")
 
 
 def stress(signals, *, seeds=6, noise=0.05):
@@ -35,7 +35,7 @@ def stress(signals, *, seeds=6, noise=0.05):
                 error = base if level == 0 else draw.normal(0, noise, len(SIGNALS))
                 values = dict(zip(SIGNALS, 1 + error, strict=True))
                 values[moved] += MOVES[level]
-                for method in METHODS:
+                for method in RECONSTRUCTIONS:
                     bad = level >= 3
                     rows.append(
                         {
@@ -65,29 +65,29 @@ def points(**columns):
 
 
 def test_a_failure_has_lost_a_fifth_of_r_or_doubled_its_error():
-    found = fitting.failures(points(r=[0.9, 0.73, 0.71, 0.9], rmse_rel=[0.1, 0.19, 0.1, 0.21]))
+    found = fitting.losses(points(r=[0.9, 0.73, 0.71, 0.9], rmse_rel=[0.1, 0.19, 0.1, 0.21])) > 1
     assert found.tolist() == [False, False, True, True]
 
 
 def test_a_method_that_could_not_run_has_failed_and_light_without_variation_has_not():
     ran = points(r=[0.9, np.nan, np.nan], rmse_rel=[0.1, np.nan, 0.1])
     ran["failed"] = ["", "no leaf points", np.nan]
-    assert fitting.failures(ran).tolist() == [False, True, False]
+    assert (fitting.losses(ran) > 1).tolist() == [False, True, False]
 
 
 def test_each_world_is_compared_with_itself():
     two = pd.concat([points(r=[0.9, 0.7], rmse_rel=0.1), points(r=[0.7, 0.7], rmse_rel=0.1)])
     two["seed"] = [1, 1, 2, 2]
-    assert fitting.failures(two).tolist() == [False, True, False, False]
+    assert (fitting.losses(two) > 1).tolist() == [False, True, False, False]
 
 
 def test_the_undisturbed_run_that_stressors_share_counts_once():
     runs = fitting.prepared(stress(USUAL))
-    assert len(runs[runs["harmless"]]) == 6 * len(METHODS)
-    assert len(runs[~runs["harmless"]]) == len(USUAL) * 6 * 4 * len(METHODS)
+    assert len(runs[runs["harmless"]]) == 6 * len(RECONSTRUCTIONS)
+    assert len(runs[~runs["harmless"]]) == len(USUAL) * 6 * 4 * len(RECONSTRUCTIONS)
 
 
-def test_all_methods_of_a_run_are_in_the_same_half():
+def test_all_reconstructions_of_a_run_are_in_the_same_half():
     runs = fitting.prepared(stress(USUAL))
     half = fitting.first_half(runs)
     assert 0.4 < half.mean() < 0.6
@@ -100,12 +100,12 @@ def test_all_methods_of_a_run_are_in_the_same_half():
 
 def test_only_what_is_worse_than_usual_is_suspicious():
     learned = {"usual": 0.2, "scale": 0.1}
-    assert suspicion("unknown_share", [0.1, 0.2, 0.4, 9.0], learned) == pytest.approx(
+    assert departure("unknown_share", [0.1, 0.2, 0.4, 9.0], learned) == pytest.approx(
         [0, 0, 2, MOST]
     )
-    assert suspicion("direct_share", [0.1, 0.3], learned) == pytest.approx([1, 0])
-    assert suspicion("wood_share", [0.1, 0.3], learned) == pytest.approx([1, 1])
-    assert suspicion("unknown_share", [math.nan], learned) == [0]
+    assert departure("direct_share", [0.1, 0.3], learned) == pytest.approx([1, 0])
+    assert departure("wood_share", [0.1, 0.3], learned) == pytest.approx([1, 1])
+    assert departure("unknown_share", [math.nan], learned) == [0]
 
 
 def test_no_weight_calls_off_an_alarm():
@@ -132,7 +132,7 @@ def test_trouble_of_a_kind_that_was_never_seen_is_found_by_a_signal_that_others_
     for stressor in ("more holes", "noise", "doubled"):
         own = (runs["stressor"] == stressor).to_numpy()
         alarm[own] = fitting.flagged(runs[own], fitting.fit(runs[~own]))
-    failed = fitting.failures(runs)
+    failed = fitting.losses(runs) > 1
     found = runs.assign(alarm=alarm)[failed].groupby("stressor")["alarm"].mean()
     assert found["more holes"] == 1
     assert found["noise"] > 0.9
@@ -156,7 +156,7 @@ def test_signals_that_tell_nothing_raise_few_alarms():
 def test_flags_of_either_half_come_from_the_other():
     runs = stress(USUAL)
     alarm = fitting.cross_flagged(runs)
-    failed = fitting.failures(runs).to_numpy()
+    failed = (fitting.losses(runs) > 1).to_numpy()
     assert alarm[failed].mean() > 0.85
     assert alarm[~failed].mean() < 0.15
 
@@ -174,22 +174,22 @@ def models():
 
 
 def test_a_run_as_usual_is_green_and_a_bad_one_red_with_the_signal_that_speaks_most(models):
-    assert judgement.judge(usual_signals(), METHODS, models)["state"] == "green"
-    bad = judgement.judge(usual_signals(noise_share=3.0), METHODS, models)
+    assert judgement.judge(usual_signals(), RECONSTRUCTIONS, models)["state"] == "green"
+    bad = judgement.judge(usual_signals(noise_share=3.0), RECONSTRUCTIONS, models)
     assert bad["state"] == "red"
-    reason = bad["methods"]["polygons"]["reasons"][0]
+    reason = bad["reconstructions"]["polygons"]["reasons"][0]
     assert reason["signal"] == "noise_share"
     assert "300%" in reason["text"]
     assert reason["usual"] == pytest.approx(1, abs=0.1)
     assert not reason["is_beyond"]
-    assert judgement.judge(usual_signals(noise_share=30.0), METHODS, models)["methods"]["polygons"][
-        "reasons"
-    ][0]["is_beyond"]
+    assert judgement.judge(usual_signals(noise_share=30.0), RECONSTRUCTIONS, models)[
+        "reconstructions"
+    ]["polygons"]["reasons"][0]["is_beyond"]
 
 
 def test_what_cannot_be_known_is_never_green(models):
     blind = judgement.judge(
-        usual_signals(unknown_share=math.nan, shots_per_voxel=math.nan), METHODS, models
+        usual_signals(unknown_share=math.nan, shots_per_voxel=math.nan), RECONSTRUCTIONS, models
     )
     assert blind["state"] == "amber"
     assert "without shots" in blind["unknown"][0]["text"]
@@ -197,8 +197,8 @@ def test_what_cannot_be_known_is_never_green(models):
 
 def test_a_run_is_as_good_as_its_best_method(models):
     careless = models["voxels_1.0"] | {"amber": -9.0, "red": -9.0}
-    judged = judgement.judge(usual_signals(), METHODS, models | {"voxels_1.0": careless})
-    assert judged["methods"]["voxels_1.0"]["state"] == "red"
+    judged = judgement.judge(usual_signals(), RECONSTRUCTIONS, models | {"voxels_1.0": careless})
+    assert judged["reconstructions"]["voxels_1.0"]["state"] == "red"
     assert judged["state"] == "green"
 
 
@@ -206,7 +206,12 @@ def test_models_are_stored_with_their_rates_and_judge_as_before(tmp_path, models
     path = tmp_path / "model.json"
     stored = judgement.store(path, stress(USUAL))
     assert judgement.load(path) == json.loads(json.dumps(models))
-    assert set(stored["scan"]["rates"]) == {"halves", "unseen_stressor", "by_method", "by_stressor"}
+    assert set(stored["scan"]["rates"]) == {
+        "halves",
+        "unseen_stressor",
+        "by_reconstruction",
+        "by_stressor",
+    }
 
 
 def test_the_models_that_come_along_judge_every_method_by_known_signals():
@@ -230,7 +235,7 @@ def test_the_models_that_come_along_keep_what_was_promised_on_unseen_runs():
 def test_the_page_opens_with_the_verdict_its_reasons_and_remedies(tmp_path, models):
     signals = usual_signals(noise_share=3.0)
     (tmp_path / "structure").mkdir()
-    judged = judgement.judge(signals, METHODS, models)
+    judged = judgement.judge(signals, RECONSTRUCTIONS, models)
     (tmp_path / "verdict.json").write_text(json.dumps(judged))
     written = report.build("some <tree>", tmp_path)
     assert written.index("Verdict") < written.index("Structure")

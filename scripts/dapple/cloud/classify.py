@@ -59,9 +59,9 @@ def classify(
     classifier = CLASSIFIERS[method]
     for name in classifier.needs:
         clouds.require(cloud, name, where)
-    leaf, told = classifier.load()(cloud, settings, seed)
+    leaf, found = classifier.load()(cloud, settings, seed)
     leaf = majority(cloud.xyz_m, leaf, majority_voxel_m)
-    facts = {"method": method, "points": len(cloud), **told, "leaf_share": float(leaf.mean())}
+    facts = {"method": method, "points": len(cloud), **found, "leaf_share": float(leaf.mean())}
     kinds = codes(leaf)
     if "TrueClass" in cloud.attributes:
         facts["scores"] = scores(kinds, cloud.attributes["TrueClass"])

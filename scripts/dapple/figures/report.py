@@ -84,7 +84,7 @@ def _verdict(folder: Path) -> str:
     colour = STATES[judged["state"]][0]
     parts = [f'<section class="verdict" style="border-color: {colour}">']
     parts.append(f"<h2>Verdict: {_badge(judged['state'])}</h2>")
-    for name, facts in judged["methods"].items():
+    for name, facts in judged["reconstructions"].items():
         score = f"expected loss {facts['expected_loss']:.2f}, alarm from {facts['alarm']:.2f}"
         parts.append(f"<p><b>{html.escape(name)}</b> {_badge(facts['state'])} ({score})</p><ul>")
         for reason in facts["reasons"]:

@@ -26,7 +26,7 @@ def _level_order(points: pd.DataFrame, stressor: str) -> pd.DataFrame:
 
 @style.styled
 def heat_map(points: pd.DataFrame) -> Figure:
-    """Median r over seeds by stressor and level, one panel a method; a cross marks a failure.
+    """Median r over seeds by stressor and level, a panel a reconstruction; a cross marks failure.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def _write(ax, values, labels, failed, norm) -> None:
 
 @style.styled
 def curves(points: pd.DataFrame) -> Figure:
-    """r of all methods over the levels of each stressor; shades span the seeds.
+    """r of all reconstructions over the levels of each stressor; shades span the seeds.
 
     Parameters
     ----------
@@ -126,13 +126,13 @@ def curves(points: pd.DataFrame) -> Figure:
     for ax, name in zip(grid.ravel(), names, strict=False):
         runs = points[points["stressor"] == name]
         levels = runs.groupby("level")[["label", "harmless"]].first()
-        for method in panels:
-            by = runs[runs["reconstruction"] == method].groupby("level")["r"]
+        for name in panels:
+            by = runs[runs["reconstruction"] == name].groupby("level")["r"]
             over = by.agg(["median", "min", "max"]).reindex(levels.index)
-            colour = style.colour(method, PANELS)
+            colour = style.colour(name, PANELS)
             at = np.arange(len(over))
             ax.fill_between(at, over["min"], over["max"], color=colour, alpha=0.2, lw=0)
-            ax.plot(at, over["median"], "o-", ms=2.5, color=colour, label=style.label(method))
+            ax.plot(at, over["median"], "o-", ms=2.5, color=colour, label=style.label(name))
         harmless = int(np.argmax(levels["harmless"].astype(bool)))
         ax.axvline(harmless, color="#BBBBBB", lw=3, zorder=0)
         ax.set_title(STRESSORS[name].title, fontsize=8)

@@ -23,7 +23,7 @@ PER_STRUCTURE = 64
 SPEED = ["method", "combinations", "seconds", "peak_rss_mb", "measured", "paths_per_pixel"]
 
 
-def direct(
+def render_all(
     renderer: Renderer,
     traced: Coefficients,
     properties: Spectra,

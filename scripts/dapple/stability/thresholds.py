@@ -1,17 +1,17 @@
-"""From which level on a method has failed, and where the published findings hold."""
+"""From which level on a reconstruction has failed, and where the published findings hold."""
 
 import numpy as np
 import pandas as pd
 
 R_LOST = 0.05
-"""Loss of r against the harmless level at which a method counts as failed."""
+"""Loss of r against the harmless level at which a reconstruction counts as failed."""
 RMSE_FACTOR = 2.0
 """Growth of the root mean square error at which it does too."""
 KEYS = ["stressor", "reconstruction"]
 
 
 def against_harmless(points: pd.DataFrame) -> pd.DataFrame:
-    """Add what each run of a method would have been without the stressor.
+    """Add what each run of a reconstruction would have been without the stressor.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ def against_harmless(points: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        With `r_harmless` and `rmse_harmless`: the same method, world and stressor at the
+        With `r_harmless` and `rmse_harmless`: the same reconstruction, world and stressor at the
         harmless level.
     """
     names = [*KEYS, "seed"]
@@ -49,7 +49,7 @@ def has_failed(
 
 
 def table(points: pd.DataFrame) -> pd.DataFrame:
-    """The level at which each method has failed.
+    """The level at which each reconstruction has failed.
 
     Parameters
     ----------

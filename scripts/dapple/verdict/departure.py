@@ -1,9 +1,9 @@
-"""How suspicious a signal is, and the loss that follows.
+"""How far a signal departs from undisturbed runs, and the loss that follows.
 
-Each signal becomes a suspicion: how much worse it is than in undisturbed runs, in standard
+Each signal becomes a departure: how much worse it is than in undisturbed runs, in standard
 deviations over disturbed ones, at least 0 and at most `MOST`. The expected loss is a weighted sum.
 No weight is negative: a signal can raise an alarm but not call off one, so that trouble of a kind
-that was not in the training is still seen by what it disturbs.
+that was not among the stress runs is still seen by what it disturbs.
 """
 
 from collections.abc import Iterable
@@ -14,15 +14,15 @@ import pandas as pd
 from dapple.verdict.signal_meanings import SIGNALS
 
 MOST = 4.0
-"""Largest suspicion that one signal can raise."""
+"""Largest departure that counts."""
 
 
-def suspicion(name: str, values: Iterable[float], learned: dict) -> np.ndarray:
+def departure(name: str, values: Iterable[float], learned: dict) -> np.ndarray:
     """How much worse a signal is than usual, 0 to `MOST`; 0 where it is unknown."""
-    departure = (transformed(name, values) - learned["usual"]) / learned["scale"]
+    away = (transformed(name, values) - learned["usual"]) / learned["scale"]
     worse = SIGNALS[name].worse
-    departure = np.abs(departure) if worse == 0 else worse * departure
-    return np.clip(np.nan_to_num(departure, nan=0.0), 0.0, MOST)
+    away = np.abs(away) if worse == 0 else worse * away
+    return np.clip(np.nan_to_num(away, nan=0.0), 0.0, MOST)
 
 
 def transformed(name: str, values: Iterable[float]) -> np.ndarray:
@@ -32,13 +32,13 @@ def transformed(name: str, values: Iterable[float]) -> np.ndarray:
 
 
 def expected_loss(runs: pd.DataFrame, models: dict[str, dict]) -> np.ndarray:
-    """(n,) loss that each run's signals make expect (`training.losses`); NaN without a model."""
+    """(n,) loss that each run's signals make expect (`fitting.losses`); NaN without a model."""
     found = np.full(len(runs), np.nan)
-    for method, model in models.items():
-        own = (runs["reconstruction"] == method).to_numpy()
+    for reconstruction, model in models.items():
+        own = (runs["reconstruction"] == reconstruction).to_numpy()
         total = np.full(int(own.sum()), model["intercept"])
         for name, learned in model["signals"].items():
             values = runs.loc[own, name] if name in runs else np.full(int(own.sum()), np.nan)
-            total += learned["weight"] * suspicion(name, values, learned)
+            total += learned["weight"] * departure(name, values, learned)
         found[own] = total
     return found

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import minimize
 
-from dapple.verdict.departure import expected_loss, suspicion, transformed
+from dapple.verdict.departure import departure, expected_loss, transformed
 from dapple.verdict.signal_meanings import OF_RECORDS, SIGNALS
 
 R_LOST, RMSE_GROWN = 0.2, 1.0
@@ -16,23 +16,23 @@ WORST = 2.0
 TRACELESS = ("sensor_position", "clock_offset")
 """Stressors that leave no trace in scans: only records of light can show them."""
 MIN_RUNS = 10
-"""Fewest sound runs from which a method's model is made."""
+"""Fewest sound runs from which a reconstruction's model is made."""
 
 
 def losses(points: pd.DataFrame) -> pd.Series:
-    """What runs lost, compared with the undisturbed run of the same stressor, method and seed.
+    """What runs lost, compared with the undisturbed run of stressor, reconstruction and seed.
 
     Parameters
     ----------
     points : DataFrame
         `stressor`, `level`, `reconstruction`, `seed`, `r`, `rmse_rel`, `harmless` (bool), `failed`
-        (text, empty where the method ran).
+        (text, empty where it was made).
 
     Returns
     -------
     Series of float
         The larger of the share of r lost over 0.2 and the growth of relative RMSE over 1, so that
-        1 and more is a failure; infinite where the method could not run. r that is unknown because
+        1 and more is a failure; infinite where it could not be made. r that is unknown because
         light was constant does not count.
     """
     key = ["stressor", "reconstruction", "seed"]
@@ -47,13 +47,8 @@ def losses(points: pd.DataFrame) -> pd.Series:
     return pd.Series(np.where(has_run(points), loss, np.inf), points.index, name="loss")
 
 
-def failures(points: pd.DataFrame) -> pd.Series:
-    """Which runs failed: r below 0.8 of the undisturbed run's, RMSE doubled, or no result."""
-    return (losses(points) > 1).rename("is_failure")
-
-
 def has_run(points: pd.DataFrame) -> np.ndarray:
-    """(n,) bool, False where a method stopped with a message."""
+    """(n,) bool, False where a reconstruction stopped with a message."""
     if "failed" not in points:
         return np.ones(len(points), bool)
     return (points["failed"].fillna("").astype(str) == "").to_numpy()
@@ -74,7 +69,7 @@ def prepared(points: pd.DataFrame) -> pd.DataFrame:
 
 
 def first_half(runs: pd.DataFrame, seed: int = 0) -> np.ndarray:
-    """(n,) bool: half of the runs, by chance; all methods of a run are on the same side."""
+    """(n,) bool: half of the runs, by chance; all reconstructions of a run are on the same side."""
     level = runs["level"].map(lambda value: f"{float(value):g}")
     keys = runs["stressor"].astype(str) + "|" + level + "|" + runs["seed"].astype(str)
     unique = np.unique(keys)
@@ -91,12 +86,12 @@ def fit(
     most_false_alarms: float = 0.12,
     least_loss: float = 0.15,
 ) -> dict[str, dict]:
-    """Learn which signals go with losses, for each method by itself.
+    """Learn which signals go with losses, for each reconstruction by itself.
 
     Parameters
     ----------
     points : DataFrame
-        Stress runs with signals, as `failures` takes them (or as `prepared` gives them).
+        Stress runs with signals, as `losses` takes them (or as `prepared` gives them).
     undisturbed : DataFrame, optional
         Runs that tell what is usual; else the harmless ones among the points.
     with_records : bool
@@ -113,18 +108,18 @@ def fit(
     Returns
     -------
     dict of str to dict
-        By method: `signals` (by name: `usual`, the median of undisturbed runs, `scale`, `weight`,
-        and the range from `low` to `high` that was seen), `intercept`, `amber` and `red` (expected
-        losses), numbers of `runs` and `failures`.
+        By reconstruction: `signals` (by name: `usual`, the median of undisturbed runs, `scale`,
+        `weight`, and the range from `low` to `high` that was seen), `intercept`, `amber` and `red`
+        (expected losses), numbers of `runs` and `failures`.
     """
     runs = points if "is_failure" in points else prepared(points)
     if undisturbed is None:
         undisturbed = runs[runs["harmless"].astype(bool)]
     names = [name for name in SIGNALS if name in runs and (with_records or name not in OF_RECORDS)]
     models = {}
-    for method, rows in runs[runs["ran"]].groupby("reconstruction"):
+    for name, rows in runs[runs["ran"]].groupby("reconstruction"):
         if (~rows["is_failure"]).sum() >= MIN_RUNS:
-            models[str(method)] = _fit_one(
+            models[str(name)] = _fit_one(
                 rows, undisturbed, names, penalty, most_false_alarms, least_loss
             )
     return models
@@ -152,7 +147,7 @@ def _fit_one(
             "low": float(values[known].min()),
             "high": float(values[known].max()),
         }
-    x = np.stack([suspicion(name, rows[name], learned[name]) for name in learned], axis=1)
+    x = np.stack([departure(name, rows[name], learned[name]) for name in learned], axis=1)
     loss = np.clip(rows["loss"].to_numpy(float), 0.0, WORST)
     weight, intercept = _regression(x, loss, penalty)
     for name, value in zip(learned, weight.tolist(), strict=True):
@@ -196,7 +191,7 @@ def _regression(x: np.ndarray, y: np.ndarray, penalty: float) -> tuple[np.ndarra
 
 
 def flagged(runs: pd.DataFrame, models: dict[str, dict]) -> np.ndarray:
-    """(n,) bool: runs whose verdict is amber or red; a method that could not run says so itself."""
+    """(n,) bool: runs whose verdict is amber or red; what could not be made says so itself."""
     amber = runs["reconstruction"].map({name: model["amber"] for name, model in models.items()})
     return (expected_loss(runs, models) >= amber.to_numpy(float)) | ~has_run(runs)
 
@@ -270,7 +265,8 @@ def validate(
     -------
     dict
         `halves` and `unseen_stressor`, each as `rates` gives them: a stressor left out is judged by
-        models that never saw trouble of its kind. `by_method` and `by_stressor` part the halves.
+        models that never saw trouble of its kind. `by_reconstruction` and `by_stressor` part the
+        halves.
     """
     runs = prepared(points)
     undisturbed = runs[runs["harmless"].astype(bool)]
@@ -281,8 +277,8 @@ def validate(
         own = (runs["stressor"] == stressor).to_numpy()
         unseen[own] = flagged(runs[own], fit(runs[~own], **settings))
     found = {"halves": rates(runs, halves), "unseen_stressor": rates(runs, unseen)}
-    for name, column in (("method", "reconstruction"), ("stressor", "stressor")):
-        found[f"by_{name}"] = {
+    for column in ("reconstruction", "stressor"):
+        found[f"by_{column}"] = {
             str(key): rates(rows, halves[rows.index]) for key, rows in runs.groupby(column)
         }
     return found

@@ -1,7 +1,7 @@
 """Green, amber or red: whether a run's light can be trusted, and what would help.
 
-The models are fitted to stress runs (`training`) and stored beside this file; judging needs
-neither truth nor training data. There are two sets of them: one for what a scan leaves behind
+The models are fitted to stress runs and stored beside this file; judging needs
+neither truth nor those runs. There are two sets of them: one for what a scan leaves behind
 alone, and one for runs that have records of light as well, which show wrong clocks and places.
 """
 
@@ -11,7 +11,7 @@ from pathlib import Path
 import pandas as pd
 
 from dapple.formats import json
-from dapple.verdict.departure import suspicion
+from dapple.verdict.departure import departure
 from dapple.verdict.fitting import fit, flagged, validate
 from dapple.verdict.signal_meanings import ABSENT, OF_RECORDS, SIGNALS
 
@@ -22,7 +22,9 @@ STATES = ("green", "amber", "red")
 
 
 def judge(
-    signals: dict[str, float], methods: tuple[str, ...], models: dict[str, dict] | None = None
+    signals: dict[str, float],
+    reconstructions: tuple[str, ...],
+    models: dict[str, dict] | None = None,
 ) -> dict:
     """Judge a run by its signals.
 
@@ -30,7 +32,7 @@ def judge(
     ----------
     signals : dict of str to float
         As `signals.measure` gives them; NaN where unknown.
-    methods : tuple of str
+    reconstructions : tuple of str
         Reconstructions to be judged.
     models : dict, optional
         As `fit` gives them; else the stored ones, those with records where there are any.
@@ -38,11 +40,11 @@ def judge(
     Returns
     -------
     dict
-        `state` (that of the best method: its light can be used), `methods` (by name: `state`,
-        `expected_loss`, of which 1 is failure, the `alarm` level, `reasons`, each with
-        `signal`, `value`, `usual`, `text`, `help`, `share` of the suspicion and `is_beyond` what
-        training has seen), `with_records`, `unknown` (what the run does not hold: `text`, `help`)
-        and `signals`. What cannot be known makes green amber.
+        `state` (that of the best reconstruction: its light can be used), `reconstructions` (by
+        name: `state`, `expected_loss`, of which 1 is failure, the `alarm` level, `reasons`, each
+        with `signal`, `value`, `usual`, `text`, `help`, `share` of the loss and `is_beyond` what
+        the stress runs have seen), `with_records`, `unknown` (what the run does not hold: `text`,
+        `help`) and `signals`. What cannot be known makes green amber.
     """
     with_records = any(math.isfinite(signals.get(name, math.nan)) for name in OF_RECORDS)
     models = load(with_records=with_records) if models is None else models
@@ -52,12 +54,14 @@ def judge(
         if all(not math.isfinite(signals.get(name, math.nan)) for name in names)
     ]
     judged = {
-        name: _judge_one(signals, models[name], unknown) for name in methods if name in models
+        name: _judge_one(signals, models[name], unknown)
+        for name in reconstructions
+        if name in models
     }
     states = [facts["state"] for facts in judged.values()]
     return {
         "state": min(states, key=STATES.index) if states else "amber",
-        "methods": judged,
+        "reconstructions": judged,
         "with_records": with_records,
         "unknown": unknown,
         "signals": {k: (float(v) if math.isfinite(v) else None) for k, v in signals.items()},
@@ -68,23 +72,23 @@ def _judge_one(signals: dict[str, float], model: dict, unknown: list) -> dict:
     total, raised = model["intercept"], []
     for name, learned in model["signals"].items():
         value = signals.get(name, math.nan)
-        doubt = learned["weight"] * float(suspicion(name, [value], learned)[0])
-        total += doubt
-        if doubt > 0:
-            raised.append((doubt, name, value, learned))
+        loss = learned["weight"] * float(departure(name, [value], learned)[0])
+        total += loss
+        if loss > 0:
+            raised.append((loss, name, value, learned))
     state = STATES[int(total >= model["amber"]) + int(total >= model["red"])]
     if unknown and state == "green":
         state = "amber"
-    whole = sum(doubt for doubt, *_ in raised)
+    by_signals = sum(loss for loss, *_ in raised)
     raised.sort(key=lambda reason: -reason[0])
     return {
         "state": state,
         "expected_loss": total,
         "alarm": model["amber"],
         "reasons": [
-            _reason(doubt / whole, name, value, learned)
-            for doubt, name, value, learned in raised[:3]
-            if doubt > 0.1 * whole
+            _reason(loss / by_signals, name, value, learned)
+            for loss, name, value, learned in raised[:3]
+            if loss > 0.1 * by_signals
         ],
     }
 
@@ -106,7 +110,7 @@ def _reason(share: float, name: str, value: float, learned: dict) -> dict:
 
 
 def load(path: Path = MODEL, *, with_records: bool = False) -> dict[str, dict]:
-    """The stored models by method."""
+    """The stored models by reconstruction."""
     return json.read(path)["records" if with_records else "scan"]["models"]
 
 

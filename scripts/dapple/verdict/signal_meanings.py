@@ -36,9 +36,9 @@ OCCLUDED = (
 )
 PLACES = "Survey the sensors' positions again; average over sensors or over an hour."
 LIGHT = "Judge this hour by its mean: with this sky single sensors differ too little to compare."
-METHODS_APART = (
-    "Compare both methods in a part of the crown that is seen well; where they differ, at least "
-    "one is wrong."
+DISAGREEMENT = (
+    "Compare both reconstructions in a part of the crown that is seen well; where they differ, at "
+    "least one is wrong."
 )
 
 SIGNALS = {
@@ -89,7 +89,7 @@ SIGNALS = {
         1, "polygons lack {value:.0%} of their area where beams seldom came", OCCLUDED
     ),
     "area_polygons_to_fine": Signal(
-        0, "polygons have exp({value:+.2f}) times the leaf area of the voxels", METHODS_APART
+        0, "polygons have exp({value:+.2f}) times the leaf area of the voxels", DISAGREEMENT
     ),
     "area_fine_to_coarse": Signal(
         0, "small voxels have exp({value:+.2f}) times the leaf area of large ones", COARSER
@@ -108,16 +108,16 @@ SIGNALS = {
         -1, "sensors differ by {value:.0%} of the mean light at a time", LIGHT
     ),
     "r_polygons_fine": Signal(
-        -1, "light of polygons and small voxels correlates with {value:.2f}", METHODS_APART
+        -1, "light of polygons and small voxels correlates with {value:.2f}", DISAGREEMENT
     ),
     "difference_polygons_fine": Signal(
-        0, "polygons let {value:+.0%} more light through than small voxels", METHODS_APART
+        0, "polygons let {value:+.0%} more light through than small voxels", DISAGREEMENT
     ),
     "r_fine_coarse": Signal(
-        -1, "light of small and large voxels correlates with {value:.2f}", METHODS_APART
+        -1, "light of small and large voxels correlates with {value:.2f}", DISAGREEMENT
     ),
     "difference_fine_coarse": Signal(
-        0, "small voxels let {value:+.0%} more light through than large ones", METHODS_APART
+        0, "small voxels let {value:+.0%} more light through than large ones", DISAGREEMENT
     ),
     "sensitivity_polygons": Signal(
         1, "moved sensors change light by {value:.2f} of its spread (polygons)", PLACES
@@ -156,7 +156,7 @@ ABSENT = {
     "light": (
         ("light_contrast",),
         "no light was simulated",
-        "Give sensors, so that methods can be compared by what they predict.",
+        "Give sensors, so that reconstructions can be compared by what they predict.",
     ),
 }
 """What may be lacking: signals that then are NaN, what that means, what would help."""

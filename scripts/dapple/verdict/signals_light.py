@@ -18,7 +18,7 @@ def shift_sensitivity(light: xr.Dataset | None, moved: xr.Dataset | None) -> flo
 
 
 def agreement(one: xr.Dataset | None, other: xr.Dataset | None) -> tuple[float, float]:
-    """Correlation of two methods' PAR, and the difference of their means over the larger one."""
+    """Correlation of PAR of two reconstructions, and their means' difference over the larger."""
     if one is None or other is None:
         return math.nan, math.nan
     a, b = (light[PAR].to_numpy().ravel() for light in (one, other))
