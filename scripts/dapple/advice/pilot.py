@@ -80,17 +80,7 @@ def light_and_costs(
 
     The same seed gives models that share rays the same random numbers: what differs is the model.
 
-    Parameters
-    ----------
-    scene : TracedScene
-    sensors_m : (n, 3) float64
-        Local frame [m].
-    sky : xarray.Dataset
-        Sun and sky at t times.
-    optics : Optics
-    model : Model
-    tracing : Tracing
-    seed : int
+    Parameters are those of `steps.sun` and `steps.products`.
     """
     sunlit, direct = timed(
         lambda: steps.sun(scene, sensors_m, sky, model, tracing, seed=stream_seed(seed, "sun"))

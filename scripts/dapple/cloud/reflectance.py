@@ -79,7 +79,7 @@ def by_reflectance(reflectance_db: np.ndarray, threshold_db: float = -5.4) -> np
     Returns
     -------
     (n,) bool
-        True for leaf.
+        Whether it is a leaf.
 
     Raises
     ------

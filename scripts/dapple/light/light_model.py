@@ -102,12 +102,8 @@ def simplified(sky: xr.Dataset, optics: Optics, model: Model) -> tuple[xr.Datase
 
     Parameters
     ----------
-    sky : xarray.Dataset
-        Sun and sky in b bands.
-    optics : Optics
-        In the same bands.
-    model : Model
-        Sky, ground and bands count.
+    sky, optics, model
+        As in `steps.products`.
 
     Returns
     -------

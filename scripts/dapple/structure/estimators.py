@@ -185,12 +185,10 @@ def potential_path(
     ----------
     u, hit_weight
         Potential optical paths (m,) of the hits and their weights (v, m), see `path_nodes`.
-    hits : (v,) float64
-        Weight of leaf hits.
+    hits, max_pad
+        As in `transmittance`.
     passing : (v,) float64
         Sum of weight times optical path of what passes or stops at wood or noise.
-    max_pad : float
-        The estimate where the solution is larger or where nothing passes [m² m⁻³].
 
     Returns
     -------

@@ -66,7 +66,7 @@ def projection(distribution: str, zenith_rad: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     distribution : str
-        One of `DISTRIBUTIONS`.
+        As in `density`.
     zenith_rad : array_like
         Angle between the beam (either way) and the vertical, 0 to π [rad].
 

@@ -242,14 +242,19 @@ def _walk(part, corner, size, start, direction, runs_part, runs_in, runs_out):
         t_next[axis] += t_step[axis]
 
 
+@njit(cache=True)
+def _scratch():
+    """Room for the stretches of one line: their parts, and where they begin and end."""
+    return np.empty(256, np.int64), np.empty(256), np.empty(256)
+
+
 @njit(cache=True, parallel=True)
 def _longest(part, corner, size, start, direction):
     """Longest stretch of any line inside one part."""
     n = len(start)
     result = np.zeros(N_SHARES)
     for group in prange(N_SHARES):
-        runs_part = np.empty(256, np.int64)
-        runs_in, runs_out = np.empty(256), np.empty(256)
+        runs_part, runs_in, runs_out = _scratch()
         for i in range(n * group // N_SHARES, n * (group + 1) // N_SHARES):
             line = start[i], direction[i]
             runs = _walk(part, corner, size, *line, runs_part, runs_in, runs_out)
@@ -267,8 +272,7 @@ def _trace(
     weight = np.zeros((N_SHARES, n_parts, N_NODES))
     count = np.zeros((N_SHARES, n_parts), np.int64)
     for group in prange(N_SHARES):
-        runs_part = np.empty(256, np.int64)
-        runs_in, runs_out = np.empty(256), np.empty(256)
+        runs_part, runs_in, runs_out = _scratch()
         for i in range(n * group // N_SHARES, n * (group + 1) // N_SHARES):
             line = start[i], direction[i]
             runs = _walk(part, corner, size, *line, runs_part, runs_in, runs_out)
