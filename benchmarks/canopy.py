@@ -17,6 +17,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 from dapple.config.settings import Settings
 from dapple.formats import json, rasters
 from dapple.frames import direction_from_angles
+from dapple.optics.cameras import Camera, camera
 from dapple.retrieval import coefficients, image_paths, maps, spectra, training_entries
 from dapple.scene import scene_files, traced
 from dapple.scene.surfaces import GROUND, LEAF, WOOD, Scene, Surface
@@ -47,7 +48,9 @@ def ratios(folder: Path, name: str) -> pd.DataFrame:
     trees = pd.read_csv(path / "world/trees.csv")
     here = trees.x_m.between(observed.left_m, observed.left_m + EDGE_M)
     here &= trees.y_m.between(observed.top_m - EDGE_M, observed.top_m)
-    needles, ground = truth(settings.world, trees[here])
+    seen_by = camera(settings.bands)
+    how = {"near_infrared": seen_by.near_infrared, "sunlit_nir": settings.retrieval.sunlit_nir}
+    needles, ground = truth(settings.world, seen_by, trees[here])
     west_north = observed.left_m - origin_m[0], observed.top_m - origin_m[1]
     rows = []
     for wood, shoots, pixel_m in VARIANTS:
@@ -62,9 +65,9 @@ def ratios(folder: Path, name: str) -> pd.DataFrame:
         image = coefficients.images(
             found,
             *spectra.of_shoots(*needles, plot.shoot_recollision if shoots else 0.0),
-            np.asarray(settings.images.bark_reflectance),
+            np.array(seen_by.at_centres(settings.images.bark_reflectance)),
             ground,
-            np.asarray(plot.diffuse_share),
+            np.array(seen_by.at_centres(plot.diffuse_share)),
         )
         corner = {"left_m": observed.left_m, "top_m": observed.top_m}
         grid = corner | {"pixel_m": pixel_m, "shape": (n, n)}
@@ -73,18 +76,17 @@ def ratios(folder: Path, name: str) -> pd.DataFrame:
             maps.sample(heights, **grid)[0], min_height_m=settings.retrieval.canopy_height_m
         )
         for mask in training_entries.MASKS:
-            chosen = [training_entries.select(x, canopy, mask=mask) for x in (seen, image)]
+            chosen = [training_entries.select(x, canopy, mask=mask, **how) for x in (seen, image)]
             value = seen[:, chosen[0]].mean(axis=1) / image[:, chosen[1]].mean(axis=1)
             rows.append((wood, shoots, pixel_m, mask, *value))
-    return pd.DataFrame(
-        rows, columns=["wood", "shoots", "pixel_m", "mask", *training_entries.BANDS]
-    )
+    return pd.DataFrame(rows, columns=["wood", "shoots", "pixel_m", "mask", *seen_by.names])
 
 
-def truth(world, trees: pd.DataFrame):
-    """Mean reflectance and transmittance of needles, and mean ground, in five bands."""
+def truth(world, seen_by: Camera, trees: pd.DataFrame):
+    """Mean reflectance and transmittance of needles, and mean ground, by band."""
     leaves = plot_optics.needles(
         trees.lcc_ug_cm2.to_numpy(),
+        seen_by,
         structure_n=trees.structure_n.to_numpy(),
         dry_matter_g_cm2=trees.dry_matter_g_cm2.to_numpy(),
         brown=trees.brown.to_numpy(),
@@ -92,7 +94,7 @@ def truth(world, trees: pd.DataFrame):
     )
     places = np.random.default_rng(1).uniform(0, 50, (2000, 2))
     ground = plot_optics.ground_patches(
-        places, brightness=world.soil_brightness, moisture=world.soil_moisture,
+        places, seen_by, brightness=world.soil_brightness, moisture=world.soil_moisture,
         litter_share=world.litter_share, variation=world.ground_variation, seed=1,
     )  # fmt: skip
     return [x.mean(axis=0) for x in leaves], ground.mean(axis=0)

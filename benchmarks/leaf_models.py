@@ -17,6 +17,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
 from dapple.config.settings import Settings
 from dapple.formats import geojson, json, rasters
+from dapple.optics.cameras import ZHAO
 from dapple.retrieval import evaluation, network, spectra, training_entries
 from dapple.retrieval.noise import Noise
 from training_set import images, level_canopies
@@ -76,12 +77,17 @@ def entries(settings, path: Path, name: str, changed: dict, model: str) -> pd.Da
         | {"shoot_recollision": plot.shoot_recollision}
         | changed,
         COMBINATIONS,
+        ZHAO,
         seed=SEED,
     )
     params = {
         "model": model,
         "selection": {"cell_m": retrieval.map_pixel_m, "min_share": retrieval.min_share},
-        "light": plot.model_dump() | {"bark": settings.images.bark_reflectance},
+        "light": plot.model_dump()
+        | {
+            "bark": ZHAO.at_centres(settings.images.bark_reflectance),
+            "diffuse_share": ZHAO.at_centres(plot.diffuse_share),
+        },
         "sail": {"leaf_angle_deg": retrieval.leaf_angle_deg, "hot_spot": retrieval.hot_spot},
     }
     canopy = rasters.read(path / "retrieval/canopy.tif")
@@ -93,13 +99,24 @@ def entries(settings, path: Path, name: str, changed: dict, model: str) -> pd.Da
         chunks, _ = images(files[0], properties, params)
         mask, pixel_m = canopy.values[0] > 0, canopy.pixel_m
     over = training_entries.cells(mask.shape, pixel_m=pixel_m, cell_m=retrieval.map_pixel_m)
-    found = training_entries.aggregate(chunks, mask, over, masks=("sunlit",))["sunlit"]
-    return training_entries.entries(*found, drawn, max_entries=ENTRIES, seed=SEED)
+    found = training_entries.aggregate(
+        chunks,
+        mask,
+        over,
+        masks=("sunlit",),
+        near_infrared=ZHAO.near_infrared,
+        sunlit_nir=retrieval.sunlit_nir,
+        min_share=retrieval.min_share,
+    )["sunlit"]
+    return training_entries.entries(*found, drawn, ZHAO.names, max_entries=ENTRIES, seed=SEED)
 
 
 def learn(frame: pd.DataFrame, parts: dict, retrieval, *, robust: bool) -> network.Network:
     """A network, taught with or without errors in the bands."""
-    bands, target = training_entries.features(frame), frame["chlorophyll_ug_cm2"].to_numpy()
+    bands, target = (
+        training_entries.features(frame, ZHAO.names),
+        frame["chlorophyll_ug_cm2"].to_numpy(),
+    )
     relative, absolute = retrieval.relative_noise, retrieval.absolute_noise
     net, _ = network.train(
         *(x[parts[part]] for part in ("train", "validation") for x in (bands, target)),
@@ -111,7 +128,7 @@ def learn(frame: pd.DataFrame, parts: dict, retrieval, *, robust: bool) -> netwo
 
 def test(net: network.Network, frame: pd.DataFrame) -> dict[str, float]:
     """Score on simulated entries."""
-    predicted = network.predict(net, training_entries.features(frame))
+    predicted = network.predict(net, training_entries.features(frame, ZHAO.names))
     found = evaluation.scores(frame["chlorophyll_ug_cm2"].to_numpy(), predicted)
     return {"simulated_rmse": found["rmse"]}
 
@@ -120,7 +137,7 @@ def field(net: network.Network, path: Path, cell_m: float) -> dict[str, float]:
     """Score on the trees of the observed images."""
     observed = rasters.read(path / "retrieval/observed_sunlit.tif")
     crowns = geojson.read(path / "world/crowns.geojson")
-    bands = rasters.select(observed, training_entries.BANDS, path).values
+    bands = rasters.select(observed, ZHAO.names, path).values
     flat = bands.reshape(len(bands), -1).T
     lcc = np.where(np.isfinite(flat).all(axis=1), network.predict(net, flat), np.nan)
     table = evaluation.trees(

@@ -5,7 +5,7 @@ import pandas as pd
 
 from dapple.figures import chlorophyll_maps, style
 from dapple.formats import geojson, rasters, tables
-from dapple.retrieval import training_entries
+from dapple.optics.cameras import camera
 from dapple.workflow import run
 
 QUANTILES = {"low": 0.05, "middle": 0.5, "high": 0.95}
@@ -22,7 +22,7 @@ def main(snakemake):
     own = accuracy[accuracy["test_set"] == "field"]
     style.save(chlorophyll_maps.field(trees, own), output.field)
     entries = {
-        path: quantiles(tables.read(path)[list(training_entries.BANDS)], taught)
+        path: quantiles(tables.read(path), camera(params.bands), taught)
         for path, taught in zip(inputs.training, params.taught, strict=True)
     }
     figure = chlorophyll_maps.spectra(tables.read(inputs.pixels), pd.concat(entries.values()))
@@ -56,10 +56,11 @@ def outlines(crowns, corner):
     return rings, truth
 
 
-def quantiles(frame, taught):
+def quantiles(frame, seen_by, taught):
     """Quantiles of the bands of a training set."""
-    table = frame.quantile(list(QUANTILES.values())).T.set_axis(list(QUANTILES), axis=1)
-    table["wavelength_nm"] = table.index.astype(int)
+    bands = frame[list(seen_by.names)]
+    table = bands.quantile(list(QUANTILES.values())).T.set_axis(list(QUANTILES), axis=1)
+    table["wavelength_nm"] = [round(band.centre_nm) for band in seen_by]
     return table.assign(model=taught["model"], mask=taught["mask"])
 
 

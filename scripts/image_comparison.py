@@ -4,6 +4,7 @@ import numpy as np
 
 from dapple.formats import json, tables
 from dapple.frames import direction_from_angles
+from dapple.optics.cameras import camera
 from dapple.retrieval import coefficient_files as files
 from dapple.retrieval import image_methods, spectra
 from dapple.retrieval.rendered_images import Renderer
@@ -17,8 +18,9 @@ def main(snakemake):
     scene = scene_files.read_plot(inputs.leaves, inputs.wood, inputs.terrain)
     traced, fitted = files.read(inputs.coefficients), files.read_semiless(inputs.semiless)
     share = np.asarray(params.diffuse_share)
+    seen_by = camera(params.bands, *inputs.responses)
     drawn, properties = spectra.combinations(
-        params.leaves_and_soils, params.direct_renders, seed=params.seed
+        params.leaves_and_soils, params.direct_renders, seen_by, seed=params.seed
     )
     reference, render_s, render_paths = image_methods.render_all(
         Renderer(scene, variant=params.variant),
@@ -33,12 +35,19 @@ def main(snakemake):
     render_peak_mb = peak_rss_mb()
     images = image_methods.FastImages(traced, fitted, params.bark, share)
     means = images.means(properties)
-    table = image_methods.errors(images, means, reference, params.leaves_and_soils, params.seed)
+    table = image_methods.errors(
+        images, means, reference, params.leaves_and_soils, seen_by, params.seed
+    )
     tables.write(output.comparison, table)
-    tables.write(output.renders, image_methods.per_combination(drawn, properties, reference, means))
+    tables.write(
+        output.renders, image_methods.per_combination(drawn, properties, seen_by, reference, means)
+    )
     print(table.to_string())
     _, many = spectra.combinations(
-        params.leaves_and_soils, params.speed_combinations, seed=stream_seed(params.seed, "speed")
+        params.leaves_and_soils,
+        params.speed_combinations,
+        seen_by,
+        seed=stream_seed(params.seed, "speed"),
     )
     speeds = image_methods.speed(
         images,

@@ -22,7 +22,7 @@ def main(snakemake):
         noise = Noise(**params.errors) if taught["network"] == "robust" else None
         interval, known = calibrate(tables.read(table_path), networks, noise, params)
         observed = rasters.read(observed_path)
-        bands = rasters.select(observed, training_entries.BANDS, observed_path).values
+        bands = rasters.select(observed, params.bands, observed_path).values
         layers, each = maps.retrieve(networks, interval, known, bands)
         names = (*maps.MAP_BANDS, *(f"seed_{seed}_ug_cm2" for seed in params.seeds))
         rasters.write(
@@ -44,7 +44,10 @@ def calibrate(frame, networks, noise, params):
     parts = network.split(
         frame["combination"].to_numpy(), seed=params.split_seed, **dict(params.split)
     )
-    features, target = training_entries.features(frame), frame["chlorophyll_ug_cm2"].to_numpy(float)
+    features, target = (
+        training_entries.features(frame, params.bands),
+        frame["chlorophyll_ug_cm2"].to_numpy(float),
+    )
     if noise:
         features = noise.add(features, np.random.default_rng(params.split_seed))
     held = parts["validation"]

@@ -4,13 +4,15 @@ import numpy as np
 import pandas as pd
 
 from dapple.formats import rasters, tables
+from dapple.optics.cameras import camera
 from dapple.retrieval import maps, training_entries
 from dapple.workflow import run
 
 
 def main(snakemake):
     params, path = snakemake.params, snakemake.input.images
-    observed = rasters.select(rasters.read(path), training_entries.BANDS, path)
+    seen_by = camera(params.bands)
+    observed = rasters.select(rasters.read(path), seen_by.names, path)
     rasters.require_reflectance(observed, path)
     heights = rasters.read(snakemake.input.heights)
     rasters.require_overlap(
@@ -35,12 +37,13 @@ def main(snakemake):
     over = training_entries.cells(canopy.shape, pixel_m=params.pixel_m, cell_m=params.cell_m)
     found = training_entries.aggregate(
         training_entries.chunks_of(image), canopy, over,
-        sunlit_nir=params.sunlit_nir, min_share=params.min_share,
+        near_infrared=seen_by.near_infrared, sunlit_nir=params.sunlit_nir,
+        min_share=params.min_share,
     )  # fmt: skip
     corner = (observed.left_m, observed.top_m)
     for mask, (means, count) in found.items():
         layers = np.concatenate([means[0], count.astype(np.float32)])
-        bands = (*training_entries.BANDS, "pixels")
+        bands = (*seen_by.names, "pixels")
         raster = rasters.Raster(layers, *corner, params.cell_m, observed.crs, bands)
         rasters.write(snakemake.output[mask], raster)
         print(f"{mask}: {np.isfinite(means[0, 0]).sum()} of {means[0, 0].size} cells with data")
@@ -48,24 +51,25 @@ def main(snakemake):
         canopy[None].astype(np.float32), *corner, params.pixel_m, observed.crs, ("canopy",)
     )
     rasters.write(snakemake.output.canopy, mask)
-    tables.write(snakemake.output.pixels, pixel_spectra(image, canopy, params.sunlit_nir))
+    tables.write(snakemake.output.pixels, pixel_spectra(image, canopy, seen_by, params.sunlit_nir))
 
 
-def pixel_spectra(image, canopy, sunlit_nir):
+def pixel_spectra(image, canopy, seen_by, sunlit_nir):
     """Mean and deviation of each band over sunlit, shaded and all canopy pixels."""
-    known = training_entries.select(image, canopy, mask="all")
-    sunlit = training_entries.select(image, canopy, mask="sunlit", sunlit_nir=sunlit_nir)
+    how = {"near_infrared": seen_by.near_infrared, "sunlit_nir": sunlit_nir}
+    known = training_entries.select(image, canopy, mask="all", **how)
+    sunlit = training_entries.select(image, canopy, mask="sunlit", **how)
     kinds = {"sunlit": sunlit, "shaded": known & ~sunlit, "all": known}
     rows = [
         {
             "kind": kind,
-            "wavelength_nm": int(name),
+            "wavelength_nm": round(band.centre_nm),
             "n": int(chosen.sum()),
-            "mean": float(band[chosen].mean()) if chosen.any() else np.nan,
-            "deviation": float(band[chosen].std()) if chosen.any() else np.nan,
+            "mean": float(values[chosen].mean()) if chosen.any() else np.nan,
+            "deviation": float(values[chosen].std()) if chosen.any() else np.nan,
         }
         for kind, chosen in kinds.items()
-        for name, band in zip(training_entries.BANDS, image, strict=True)
+        for band, values in zip(seen_by, image, strict=True)
     ]
     return pd.DataFrame(rows)
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from dapple.errors import InputError
 from dapple.formats import json, meshes, rasters, tables
+from dapple.optics.cameras import camera
 from dapple.retrieval import coefficient_files as coefficient_files
 from dapple.retrieval import coefficients, prosail, semiless, spectra, training_entries
 from dapple.workflow import options, run
@@ -15,8 +16,9 @@ def main(snakemake):
     params, start = options(snakemake.params), time.perf_counter()
     canopy = rasters.read(snakemake.input.canopy)
     settings = params["leaves_and_soils"]
+    seen_by = camera(params["bands"], *snakemake.input.responses)
     leaves, properties = spectra.combinations(
-        settings, settings["combinations"], seed=params["seed"]
+        settings, settings["combinations"], seen_by, seed=params["seed"]
     )
     origin_m = json.read(snakemake.input.summary)["world_origin_m"]
     if params["model"] == "prosail":
@@ -31,13 +33,13 @@ def main(snakemake):
     selection = params["selection"]
     over = training_entries.cells(mask.shape, pixel_m=pixel_m, cell_m=selection["cell_m"])
     found = training_entries.aggregate(
-        chunks, mask, over,
+        chunks, mask, over, near_infrared=seen_by.near_infrared,
         sunlit_nir=selection["sunlit_nir"], min_share=selection["min_share"],
     )  # fmt: skip
     for name, (means, count) in found.items():
         path = snakemake.output[name]
         frame = training_entries.entries(
-            means, count, leaves,
+            means, count, leaves, seen_by.names,
             max_entries=params["max_entries"], seed=params["seed"], where=path,
         )  # fmt: skip
         n_made = int(np.isfinite(means[:, 0]).sum())

@@ -6,7 +6,7 @@ import numpy as np
 
 from dapple.formats import json, meshes, rasters, tables
 from dapple.formats.rasters import Raster
-from dapple.optics.bands import CAMERA_NM
+from dapple.optics import cameras
 from dapple.streams import stream_seed
 from dapple.virtual import camera
 from dapple.virtual.plot_materials import assemble
@@ -19,11 +19,13 @@ def main(snakemake):
     origin_m = np.asarray(settings["origin_m"], float)
     trees = tables.read(inputs.trees)
     trees[["x_m", "y_m", "z_m"]] -= origin_m
+    seen_by = cameras.camera(settings["bands"], *inputs.responses)
     world, materials = assemble(
         trees,
         [meshes.read_ply(path) for path in inputs.leaves],
         [meshes.read_ply(path) for path in inputs.wood],
         meshes.read_ply(inputs.terrain),
+        seen_by,
         ground=settings["ground"],
         ground_seed=stream_seed(seed, "ground"),
         **{name: settings[name] for name in ("lowest_to_highest_lcc", "lcc_layers", "water_cm")},
@@ -32,8 +34,15 @@ def main(snakemake):
     print(f"{len(world.faces)} triangles, {len(materials.reflectance)} materials")
     del world
     built = time.perf_counter()
-    view = camera.Camera.over(settings["size_m"], settings["pixel_m"])
-    image = camera.photograph(scene, view, **settings["light"], seed=stream_seed(seed, "paths"))
+    view = camera.View.over(settings["size_m"], settings["pixel_m"])
+    paths = settings["light"].pop("paths_per_pixel")
+    image = camera.photograph(
+        scene,
+        view,
+        **settings["light"],
+        paths_per_pixel=[paths[seen_by.is_infrared(k)] for k in range(0, len(seen_by), 3)],
+        seed=stream_seed(seed, "paths"),
+    )
     image = camera.with_noise(image, **settings["noise"], seed=stream_seed(seed, "noise"))
     rasters.write(
         snakemake.output.images,
@@ -43,7 +52,7 @@ def main(snakemake):
             origin_m[1] + view.top_m,
             view.pixel_m,
             settings["crs"],
-            tuple(f"{centre:.0f}" for centre in CAMERA_NM),
+            seen_by.names,
         ),
     )
     facts = {

@@ -7,7 +7,12 @@ Makes   nothing
 
 from itertools import product
 
+from dapple.optics.cameras import camera
+
 CHLOROPHYLL = settings.chlorophyll
+BANDS = CHLOROPHYLL.bands
+CAMERA = camera(BANDS)
+RESPONSES = [data(CHLOROPHYLL.responses)] if CHLOROPHYLL.responses else []
 CROWNS = CHLOROPHYLL.crowns
 RETRIEVAL = CHLOROPHYLL.retrieval
 CROWN_NOISE = {"cell_m": CROWNS.noise_cell_m, "most_points": CROWNS.noise_points}
@@ -91,7 +96,7 @@ def plot_light(wildcards):
     return {
         "sun_zenith_deg": plot.sun_zenith_deg,
         "sun_azimuth_deg": plot.sun_azimuth_deg,
-        "diffuse_share": plot.diffuse_share,
+        "diffuse_share": CAMERA.at_centres(plot.diffuse_share),
         "paths_per_pixel": WORLD.paths_per_pixel,
     }
 
@@ -246,8 +251,8 @@ def simulated_light(wildcards):
     plot = plot_of(wildcards)
     return {
         "sun_zenith_deg": plot.sun_zenith_deg,
-        "diffuse_share": plot.diffuse_share,
-        "bark": CHLOROPHYLL.images.bark_reflectance,
+        "diffuse_share": CAMERA.at_centres(plot.diffuse_share),
+        "bark": CAMERA.at_centres(CHLOROPHYLL.images.bark_reflectance),
     }
 
 

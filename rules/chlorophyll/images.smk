@@ -65,11 +65,13 @@ rule image_semiless:
     resources:
         mem_mb=2000,
     params:
-        diffuse_share=lambda wildcards: plot_of(wildcards).diffuse_share,
+        diffuse_share=lambda wildcards: CAMERA.at_centres(
+            plot_of(wildcards).diffuse_share
+        ),
         levels=IMAGES.absorption_levels,
         structure=IMAGES.leaf_structure,
         degree=IMAGES.degree,
-        bark=IMAGES.bark_reflectance,
+        bark=CAMERA.at_centres(IMAGES.bark_reflectance),
         soils=IMAGES.reference_soils,
     message:
         said("fit Semi-LESS to the images of {wildcards.plot}")
@@ -86,6 +88,7 @@ rule image_comparison:
         semiless=plot_file("images/semiless.nc"),
         tracing=plot_file("images/tracing.json"),
         fitting=plot_file("images/fitting.json"),
+        responses=RESPONSES,
         code=code("image_comparison"),
     output:
         comparison=plot_file("images/comparison.csv"),
@@ -101,10 +104,13 @@ rule image_comparison:
     resources:
         mem_mb=3000,
     params:
+        bands=BANDS,
         leaves_and_soils=leaves_and_soils,
         sun=plot_sun,
-        diffuse_share=lambda wildcards: plot_of(wildcards).diffuse_share,
-        bark=IMAGES.bark_reflectance,
+        diffuse_share=lambda wildcards: CAMERA.at_centres(
+            plot_of(wildcards).diffuse_share
+        ),
+        bark=CAMERA.at_centres(IMAGES.bark_reflectance),
         direct_renders=IMAGES.direct_renders,
         direct_paths=IMAGES.direct_paths,
         speed_combinations=IMAGES.speed_combinations,

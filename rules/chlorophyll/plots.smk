@@ -7,7 +7,7 @@ Makes   plots/{plot}/world/trees.csv       trees in world coordinates, their siz
         plots/{plot}/world/terrain.ply     the true ground
         plots/{plot}/world/grown_*.ply     leaves and wood of the trees that others are copies of
         plots/{plot}/world/lidar.laz       returns of a UAV's laser scanner
-        plots/{plot}/world/images.tif      reflectance in five bands, as a UAV's camera sees it
+        plots/{plot}/world/images.tif      reflectance as a UAV's camera sees it
 """
 
 
@@ -89,6 +89,7 @@ rule uav_images:
         terrain=plot_file("world/terrain.ply"),
         leaves=grown_files("leaves"),
         wood=grown_files("wood"),
+        responses=RESPONSES,
         code=code("uav_images"),
     output:
         images=plot_file("world/images.tif"),
@@ -105,6 +106,7 @@ rule uav_images:
     params:
         size_m=lambda wildcards: plot_of(wildcards).size_m,
         pixel_m=lambda wildcards: plot_of(wildcards).pixel_m,
+        bands=BANDS,
         light=plot_light,
         noise={"relative": WORLD.relative_noise, "absolute": WORLD.absolute_noise},
         ground=WORLD_GROUND,

@@ -37,6 +37,7 @@ rule observed_cells:
         mem_mb=2000,
     params:
         **SELECTION,
+        bands=BANDS,
         pixel_m=CHLOROPHYLL.images.pixel_m,
     message:
         said("average the observed images of {wildcards.plot}")
@@ -49,6 +50,7 @@ rule training_set:
         unpack(simulation),
         canopy=plot_file("retrieval/canopy.tif"),
         summary=plot_file("scene/summary.json"),
+        responses=RESPONSES,
         code=code("training_set"),
     output:
         sunlit=plot_file("retrieval/training_{model}_sunlit.parquet"),
@@ -63,6 +65,7 @@ rule training_set:
     resources:
         mem_mb=4000,
     params:
+        bands=BANDS,
         leaves_and_soils=leaves_and_soils,
         light=simulated_light,
         selection=SELECTION,
@@ -99,6 +102,7 @@ rule network:
     resources:
         mem_mb=2000,
     params:
+        bands=CAMERA.names,
         seeds=RETRIEVAL.seeds,
         split=SPLIT,
         split_seed=split_seed,
@@ -133,6 +137,7 @@ rule lcc_map:
         mem_mb=2000,
     params:
         taught=lambda wildcards: taught_by(wildcards.model),
+        bands=CAMERA.names,
         seeds=RETRIEVAL.seeds,
         split=SPLIT,
         split_seed=split_seed,
@@ -169,6 +174,7 @@ rule accuracy:
     params:
         plot="{plot}",
         taught=lambda wildcards: taught_by(wildcards.model),
+        bands=CAMERA.names,
         seeds=RETRIEVAL.seeds,
         split=SPLIT,
         split_seed=split_seed,
@@ -243,6 +249,7 @@ rule chlorophyll_figures:
         mem_mb=1500,
     params:
         taught=TAUGHT,
+        bands=BANDS,
     message:
         said("figures of {wildcards.plot}")
     script:

@@ -6,7 +6,7 @@ import pytest
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh, concatenate
 from dapple.virtual import camera
-from dapple.virtual.camera import Camera
+from dapple.virtual.camera import View
 from dapple.virtual.plot_optics import Materials
 
 SUN = {"sun_zenith_deg": 58.0, "sun_azimuth_deg": 266.32}
@@ -30,7 +30,7 @@ def photo(meshes, optics, *, diffuse=0.0, paths=8192, seed=1, sun=SUN, size_m=(4
     of_face = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes])
     scene = camera.build(concatenate(meshes), Materials(reflectance, transmittance, of_face))
     return camera.photograph(
-        scene, Camera.over(size_m, 1.0), **sun, diffuse_share=np.full(5, diffuse),
+        scene, View.over(size_m, 1.0), **sun, diffuse_share=np.full(5, diffuse),
         paths_per_pixel=(paths, paths), seed=seed,
     )  # fmt: skip
 
@@ -111,11 +111,11 @@ def test_noise_grows_with_the_signal():
 
 
 def test_the_camera_sees_the_whole_pixels_of_a_plot():
-    assert vars(Camera.over((20.0, 30.0), 0.026)) == {
+    assert vars(View.over((20.0, 30.0), 0.026)) == {
         "left_m": 0.0, "top_m": 30.0, "rows": 1153, "columns": 769, "pixel_m": 0.026,
     }  # fmt: skip
     with pytest.raises(InputError, match="pixels smaller"):
-        Camera.over((0.5, 3.0), 1.0)
+        View.over((0.5, 3.0), 1.0)
 
 
 def test_leaves_that_make_light_are_refused():

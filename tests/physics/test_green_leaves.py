@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 from scipy.optimize import least_squares
 
+from dapple.config.chlorophyll import Retrieval
 from dapple.optics.leaf import leaf_spectra
-from dapple.retrieval.parameters import ANTHOCYANIN_PER_CHLOROPHYLL
 
 SPECTRA = Path(os.environ.get("DAPPLE_DATA_DIR", "../shared/data")) / "spectra"
 BANDS = np.arange(440.0, 901.0, 5.0)
@@ -34,7 +34,8 @@ def test_without_anthocyanin_prospect_d_is_brighter_in_green_than_prospect_5(chl
 
     of_five = green(0.0, "5")
     assert green(0.0) > 1.1 * of_five
-    assert abs(green(ANTHOCYANIN_PER_CHLOROPHYLL) / of_five - 1) < 0.5 * (green(0.0) / of_five - 1)
+    with_anthocyanin = green(Retrieval().anthocyanin_per_chlorophyll)
+    assert abs(with_anthocyanin / of_five - 1) < 0.5 * (green(0.0) / of_five - 1)
 
 
 @pytest.mark.parametrize("species", ["larch", "birch"])
@@ -55,4 +56,4 @@ def test_a_green_leaf_of_the_less_database_holds_that_share(species):
 
     bounds = ([1.0, 5.0, 0.0, 0.0], [3.0, 100.0, 0.2, 0.05])
     fit = least_squares(error, [1.5, 40.0, 0.02, 0.005], bounds=bounds, x_scale=[1, 30, 0.05, 0.01])
-    assert fit.x[2] == pytest.approx(ANTHOCYANIN_PER_CHLOROPHYLL, abs=0.005)
+    assert fit.x[2] == pytest.approx(Retrieval().anthocyanin_per_chlorophyll, abs=0.005)

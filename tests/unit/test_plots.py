@@ -6,6 +6,7 @@ import pytest
 
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
+from dapple.optics.cameras import ZHAO
 from dapple.virtual import plot_optics, plots, terrain
 from dapple.virtual.crown_outlines import area_m2, outline
 
@@ -125,8 +126,12 @@ def test_the_terrain_mesh_fills_its_rectangle_facing_up():
     assert 0.5 * mesh.triangle_normal[:, 2].sum() == pytest.approx(13.1 * 10.3)
 
 
+LCC = {"mean_ug_cm2": 39.9, "sd_ug_cm2": 10.8, "range_ug_cm2": (10.0, 70.0)}
+SOIL = {"brightness": 0.55, "moisture": 0.4, "litter_share": 0.4}
+
+
 def test_chlorophyll_follows_the_table():
-    lcc = plot_optics.chlorophyll(20_000, seed=1)
+    lcc = plot_optics.chlorophyll(20_000, **LCC, seed=1)
     assert lcc.mean() == pytest.approx(39.9, abs=0.3)
     assert lcc.std() == pytest.approx(10.8, rel=0.04)
     assert lcc.min() >= 10
@@ -135,7 +140,7 @@ def test_chlorophyll_follows_the_table():
 
 def test_a_mean_outside_its_range_is_refused():
     with pytest.raises(InputError, match="lcc_mean"):
-        plot_optics.chlorophyll(3, mean_ug_cm2=80.0, seed=1)
+        plot_optics.chlorophyll(3, **LCC | {"mean_ug_cm2": 80.0}, seed=1)
 
 
 @pytest.mark.parametrize("ratio", [0.6, 1.0, 1.5])
@@ -155,7 +160,14 @@ def test_the_lowest_shoots_are_in_the_lowest_layer():
 
 
 def test_more_chlorophyll_means_darker_needles_in_red_edge_and_not_in_infrared():
-    reflectance, transmittance = plot_optics.needles(np.array([20.0, 60.0]))
+    reflectance, transmittance = plot_optics.needles(
+        np.array([20.0, 60.0]),
+        ZHAO,
+        structure_n=1.6,
+        dry_matter_g_cm2=0.012,
+        brown=0.05,
+        water_cm=0.015,
+    )
     assert (reflectance[0, 1:4] > reflectance[1, 1:4]).all()
     assert reflectance[0, 4] == pytest.approx(reflectance[1, 4], rel=0.01)
     assert (reflectance + transmittance < 1).all()
@@ -163,10 +175,10 @@ def test_more_chlorophyll_means_darker_needles_in_red_edge_and_not_in_infrared()
 
 def test_the_ground_is_patchy_about_its_means():
     xy = np.random.default_rng(1).uniform(0, 300, (20_000, 2))
-    even = plot_optics.ground_patches(xy, variation=0.0, seed=1)
-    patchy = plot_optics.ground_patches(xy, variation=0.2, seed=1)
+    even = plot_optics.ground_patches(xy, ZHAO, **SOIL, variation=0.0, seed=1)
+    patchy = plot_optics.ground_patches(xy, ZHAO, **SOIL, variation=0.2, seed=1)
     assert np.ptp(even, axis=0).max() < 1e-12
     np.testing.assert_allclose(patchy.mean(axis=0), even[0], rtol=0.1)
     assert (patchy.std(axis=0) > 0.02 * even[0]).all()
-    near = plot_optics.ground_patches(xy + 0.05, variation=0.2, seed=1)
+    near = plot_optics.ground_patches(xy + 0.05, ZHAO, **SOIL, variation=0.2, seed=1)
     assert np.abs(near - patchy).max() < 0.3 * np.ptp(patchy)

@@ -6,6 +6,8 @@ from dapple.errors import InputError
 from dapple.retrieval import training_entries
 
 PIXEL_M = 0.5
+BANDS = ("450", "560", "650", "730", "840")
+SUNLIT = {"near_infrared": 4, "sunlit_nir": 0.25}
 
 
 def image_of(near_infrared, others=0.1):
@@ -16,7 +18,9 @@ def image_of(near_infrared, others=0.1):
 def means_of(image, canopy=None, cell_m=3.0, **options):
     canopy = np.ones(image.shape[1:], bool) if canopy is None else canopy
     over = training_entries.cells(image.shape[1:], pixel_m=PIXEL_M, cell_m=cell_m)
-    return training_entries.aggregate(training_entries.chunks_of(image), canopy, over, **options)
+    return training_entries.aggregate(
+        training_entries.chunks_of(image), canopy, over, **SUNLIT, **{"min_share": 0.02, **options}
+    )
 
 
 def test_cells_start_in_the_north_west_and_the_last_ones_are_cut():
@@ -56,7 +60,7 @@ def test_pixels_that_are_chosen_to_look_at_are_those_that_are_averaged():
     image[2, 3, 4] = np.nan
     canopy = rng.random((12, 18)) < 0.7
     for mask in training_entries.MASKS:
-        chosen = training_entries.select(image, canopy, mask=mask)
+        chosen = training_entries.select(image, canopy, mask=mask, **SUNLIT)
         mean, count = means_of(image, canopy)[mask]
         assert count.sum() == chosen.sum()
         assert mean[0, :, 0, 1] == pytest.approx(
@@ -88,13 +92,15 @@ def test_it_does_not_matter_in_which_chunks_images_come():
     rng = np.random.default_rng(2)
     values = rng.random((12 * 12, 3, 5)).astype(np.float32)
     over, canopy = training_entries.cells((12, 12), pixel_m=0.5), np.ones((12, 12), bool)
-    whole = training_entries.aggregate([(slice(0, 144), values)], canopy, over)
+    whole = training_entries.aggregate(
+        [(slice(0, 144), values)], canopy, over, **SUNLIT, min_share=0.02
+    )
     parts = [(slice(low, low + 48), values[low : low + 48]) for low in (0, 48, 96)]
-    apart = training_entries.aggregate(iter(parts), canopy, over)
+    apart = training_entries.aggregate(iter(parts), canopy, over, **SUNLIT, min_share=0.02)
     for mask in training_entries.MASKS:
         assert np.array_equal(whole[mask][0], apart[mask][0], equal_nan=True)
     with pytest.raises(InputError, match="48 pixels; expected the 144"):
-        training_entries.aggregate([parts[0], parts[2]], canopy, over)
+        training_entries.aggregate([parts[0], parts[2]], canopy, over, **SUNLIT, min_share=0.02)
 
 
 def test_entries_carry_the_leaf_and_soil_that_made_them():
@@ -102,29 +108,35 @@ def test_entries_carry_the_leaf_and_soil_that_made_them():
     means[1, :, 0, 0] = np.nan
     count = np.array([[[4, 5]], [[0, 6]]], np.int32)
     leaves = pd.DataFrame({"chlorophyll_ug_cm2": [20.0, 60.0]})
-    frame = training_entries.entries(means, count, leaves)
+    frame = training_entries.entries(means, count, leaves, BANDS)
     assert frame["combination"].tolist() == [0, 0, 1]
     assert frame["column"].tolist() == [0, 1, 1]
     assert frame["pixels"].tolist() == [4, 5, 6]
     assert frame["chlorophyll_ug_cm2"].tolist() == [20.0, 20.0, 60.0]
-    assert np.array_equal(training_entries.features(frame)[2], means[1, :, 0, 1])
+    assert np.array_equal(training_entries.features(frame, BANDS)[2], means[1, :, 0, 1])
 
 
 def test_some_of_many_entries_are_drawn_and_stay_in_order():
     means, count = np.ones((10, 5, 3, 3), np.float32), np.ones((10, 3, 3), np.int32)
     leaves = pd.DataFrame({"n": np.arange(10.0)})
-    frame = training_entries.entries(means, count, leaves, max_entries=40, seed=1)
+    frame = training_entries.entries(means, count, leaves, BANDS, max_entries=40, seed=1)
     assert len(frame) == 40
     assert frame["combination"].is_monotonic_increasing
-    assert frame.equals(training_entries.entries(means, count, leaves, max_entries=40, seed=1))
-    assert not frame.equals(training_entries.entries(means, count, leaves, max_entries=40, seed=2))
+    assert frame.equals(
+        training_entries.entries(means, count, leaves, BANDS, max_entries=40, seed=1)
+    )
+    assert not frame.equals(
+        training_entries.entries(means, count, leaves, BANDS, max_entries=40, seed=2)
+    )
 
 
 def test_nothing_to_learn_from_is_an_error():
     leaves, dark = pd.DataFrame({"n": [1.0]}), np.full((1, 5, 2, 2), np.nan)
     with pytest.raises(InputError, match="no cell with enough canopy"):
-        training_entries.entries(dark, np.zeros((1, 2, 2)), leaves)
+        training_entries.entries(dark, np.zeros((1, 2, 2)), leaves, BANDS)
     with pytest.raises(InputError, match="1 images; expected 2"):
-        training_entries.entries(dark, np.zeros((1, 2, 2)), pd.DataFrame({"n": [1.0, 2.0]}))
+        training_entries.entries(dark, np.zeros((1, 2, 2)), pd.DataFrame({"n": [1.0, 2.0]}), BANDS)
     with pytest.raises(InputError, match="mask"):
-        training_entries.select(image_of(np.ones((2, 2))), np.ones((2, 2), bool), mask="shaded")
+        training_entries.select(
+            image_of(np.ones((2, 2))), np.ones((2, 2), bool), mask="shaded", **SUNLIT
+        )

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from dapple import clock
 from dapple.config.chlorophyll import GridRange
 from dapple.errors import InputError, MissingMissesError
+from dapple.optics.cameras import camera
 from dapple.stability import stressors
 from dapple.stability.reconstructions import chosen
 from dapple.survey import designs
@@ -291,8 +292,15 @@ def survey_beams(settings: Settings, where: str) -> None:
 
 
 def chlorophyll(settings: Settings, where: str) -> None:
-    """Plots hold pixels and trees; grids of leaves and soils run upwards."""
+    """Bands tell sunlit leaves, plots hold pixels and trees, grids of leaves run upwards."""
     section = settings.chlorophyll
+    names = [name for name, _, _ in section.bands]
+    if len(set(names)) < len(names):
+        raise InputError(
+            where, f"`chlorophyll.bands` named {names}", "each name once", "Rename one of them."
+        )
+    if "sunlit" in section.retrieval.masks:
+        _ = camera(section.bands).near_infrared
     for name in section.plots:
         plot = getattr(section, name)
         for key, pixel_m in (("images", section.images.pixel_m), (name, plot.pixel_m)):

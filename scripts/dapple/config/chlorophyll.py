@@ -7,18 +7,22 @@ from typing import Annotated, Literal
 from annotated_types import Ge, Gt, Le, Lt
 
 from dapple.config.base import Count, NotNegative, Positive, Section, Share, Some, key
+from dapple.optics.cameras import ZHAO as ZHAO_CAMERA
 
 ZHAO = "Zhao et al. 2025"
 ZHANG = "Zhang et al. 2016"
 # Least and most of a parameter, and levels of a grid between them.
 GridRange = tuple[NotNegative, NotNegative, Count]
+Spectrum = Some[tuple[Positive, Share]]
 
 
 class Plot(Section):
     """A plot: its virtual trees and the flight over it, or files of a real one."""
 
     lidar: str = key("", "LAZ of a real plot, relative to data_dir; empty: the virtual plot")
-    images: str = key("", "GeoTIFF of five bands of a real plot, relative to data_dir")
+    images: str = key(
+        "", "GeoTIFF of a real plot whose bands have the camera's names, relative to data_dir"
+    )
     crowns: str = key("", "GeoJSON of crowns with `lcc_ug_cm2`, relative to data_dir")
     size_m: tuple[Positive, Positive] = key((50.0, 50.0), "edges east and north", ZHAO)
     cover: Annotated[float, Gt(0), Le(0.95)] = key(0.62, "canopy cover", ZHAO)
@@ -34,9 +38,9 @@ class Plot(Section):
     crown_leaf_area_index: Positive = key(3.0, "leaf area over the area of the crown's outline")
     sun_zenith_deg: Annotated[float, Ge(0), Le(80)] = key(58.0, "of the images", ZHAO)
     sun_azimuth_deg: Annotated[float, Ge(0), Le(360)] = key(266.32, "of the images", ZHAO)
-    diffuse_share: tuple[Share, Share, Share, Share, Share] = key(
-        (0.32, 0.19, 0.14, 0.11, 0.09),
-        "of the light on level ground, from the sky, in the five bands",
+    diffuse_share: Spectrum = key(
+        ((450.0, 0.32), (560.0, 0.19), (650.0, 0.14), (730.0, 0.11), (840.0, 0.09)),
+        "of the light on level ground, from the sky: wavelength [nm] and share, linear between",
         "SPECTRL2 (Bird and Riordan 1986), aerosol optical depth 0.1 at 500 nm",
     )
     pixel_m: Positive = key(0.04, "of the images", ZHAO)
@@ -164,9 +168,9 @@ class Images(Section):
         32, "functions of the kind of path kept per pixel, for sun and sky each"
     )
     max_orders: Annotated[int, Ge(2), Le(250)] = key(100, "most surfaces on a path")
-    bark_reflectance: tuple[Share, Share, Share, Share, Share] = key(
-        (0.115, 0.132, 0.157, 0.197, 0.278),
-        "of wood, in the five bands; Semi-LESS takes their mean",
+    bark_reflectance: Spectrum = key(
+        ((450.0, 0.115), (560.0, 0.132), (650.0, 0.157), (730.0, 0.197), (840.0, 0.278)),
+        "of wood: wavelength [nm] and reflectance, linear between; Semi-LESS takes the bands' mean",
         "larch branches in the spectral database of LESS",
     )
     absorption_levels: Annotated[int, Ge(4), Le(100)] = key(14, "Semi-LESS: leaves to fit to", ZHAO)
@@ -247,6 +251,14 @@ class Chlorophyll(Section):
     """Leaf chlorophyll from UAV images and UAV LiDAR."""
 
     plots: Some[Literal["larch", "spruce", "user"]] = key(("larch", "spruce"), "plots to map")
+    bands: Some[tuple[str, Positive, Positive]] = key(
+        tuple((band.name, band.centre_nm, band.width_nm) for band in ZHAO_CAMERA),
+        "of the camera: name in the images, centre and width [nm]",
+        ZHAO,
+    )
+    responses: str = key(
+        "", "CSV of wavelength_nm and a response by name of band, relative to data_dir; empty: flat"
+    )
     margin_m: NotNegative = key(10.0, "surroundings of a plot that shade it")
     larch: Plot = Plot(shoot_recollision=0.06)
     spruce: Plot = Plot(
@@ -260,7 +272,7 @@ class Chlorophyll(Section):
         crown_base_share=0.12,
         dbh_m=0.16,
         crown_leaf_area_index=4.5,
-        diffuse_share=(0.24, 0.14, 0.11, 0.09, 0.07),
+        diffuse_share=((450.0, 0.24), (560.0, 0.14), (650.0, 0.11), (730.0, 0.09), (840.0, 0.07)),
         sun_zenith_deg=38.53,
         sun_azimuth_deg=242.81,
         pixel_m=0.026,

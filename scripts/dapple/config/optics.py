@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from annotated_types import Ge, Le
 
 from dapple.config.base import NotNegative, Section, Share, Some, key
+from dapple.optics.default_spectra import BARK, LEAF, MEADOW
 
 
 class SpectrumTable(Section):
@@ -25,12 +26,12 @@ class LeafOptics(SpectrumTable):
         "", "instead: a table of wavelength, reflectance and transmittance, relative to data_dir"
     )
     transmittance_column: str = key("", "column of transmittance; empty: by its usual name")
-    n: Annotated[float, Ge(1), Le(4)] = key(1.5, "leaf structure index N")
-    chlorophyll_ug_cm2: NotNegative = key(45.0, "chlorophyll a + b")
-    carotenoids_ug_cm2: NotNegative = key(9.0, "carotenoids")
-    brown: NotNegative = key(0.0, "brown pigments, arbitrary units")
-    water_cm: NotNegative = key(0.012, "equivalent water thickness")
-    dry_matter_g_cm2: NotNegative = key(0.006, "dry matter")
+    n: Annotated[float, Ge(1), Le(4)] = key(LEAF["n"], "leaf structure index N")
+    chlorophyll_ug_cm2: NotNegative = key(LEAF["chlorophyll_ug_cm2"], "chlorophyll a + b")
+    carotenoids_ug_cm2: NotNegative = key(LEAF["carotenoids_ug_cm2"], "carotenoids")
+    brown: NotNegative = key(LEAF["brown"], "brown pigments, arbitrary units")
+    water_cm: NotNegative = key(LEAF["water_cm"], "equivalent water thickness")
+    dry_matter_g_cm2: NotNegative = key(LEAF["dry_matter_g_cm2"], "dry matter")
 
 
 class Spectrum(SpectrumTable):
@@ -46,8 +47,5 @@ class Optics(Section):
     """Spectra of leaf, bark and meadow."""
 
     leaf: LeafOptics = LeafOptics()
-    bark: Spectrum = Spectrum(wavelength_nm=(400.0, 550.0, 700.0), reflectance=(0.10, 0.18, 0.26))
-    ground: Spectrum = Spectrum(
-        wavelength_nm=(400.0, 500.0, 550.0, 600.0, 680.0, 700.0),
-        reflectance=(0.03, 0.05, 0.10, 0.07, 0.05, 0.12),
-    )
+    bark: Spectrum = Spectrum(**BARK)
+    ground: Spectrum = Spectrum(**MEADOW)

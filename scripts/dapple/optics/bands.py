@@ -4,12 +4,10 @@ import numpy as np
 from scipy.constants import Avogadro, Planck, speed_of_light
 from scipy.integrate import cumulative_trapezoid
 
+from dapple.optics.cameras import Camera
+
 PAR_RANGE_NM = (400.0, 700.0)
 BAND_STEP_NM = 5.0
-# The bands of a multispectral UAV camera: blue, green, red, red edge, near infrared (Zhao et al.
-# 2025), taken as flat between centre minus and centre plus half the width.
-CAMERA_NM = (450.0, 560.0, 650.0, 730.0, 840.0)
-CAMERA_HALF_WIDTH_NM = (16.0, 16.0, 16.0, 16.0, 26.0)
 
 
 def par_bands(step_nm: float = BAND_STEP_NM) -> np.ndarray:
@@ -74,20 +72,54 @@ def window_mean(
     first, last = low.min(), high.max()
     inside = (wavelength > first) & (wavelength < last)
     nodes = np.union1d(wavelength[inside], np.concatenate([low, high]))
-    right = np.clip(np.searchsorted(wavelength, nodes), 1, len(wavelength) - 1)
-    share = (nodes - wavelength[right - 1]) / (wavelength[right] - wavelength[right - 1])
-    at_nodes = values[..., right - 1] * (1 - share) + values[..., right] * share
+    at_nodes = _between(wavelength, values, nodes)
     integral = cumulative_trapezoid(at_nodes, nodes, axis=-1, initial=0.0)
     at_edges = (integral[..., np.searchsorted(nodes, edge)] for edge in (high, low))
     return np.subtract(*at_edges) / (high - low)
 
 
-def camera_windows(
-    centres_nm: np.ndarray = CAMERA_NM, half_width_nm: np.ndarray = CAMERA_HALF_WIDTH_NM
-) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper edges (b,) of a camera's bands [nm]."""
-    centres, half = np.asarray(centres_nm, float), np.asarray(half_width_nm, float)
-    return centres - half, centres + half
+def camera_mean(wavelength_nm: np.ndarray, values: np.ndarray, camera: Camera) -> np.ndarray:
+    """Average a tabulated spectrum, linear between its wavelengths, over the bands of a camera.
+
+    Parameters
+    ----------
+    wavelength_nm : (k,) float
+        Ascending wavelengths of the table [nm]; they must cover the bands.
+    values : (..., k) float
+        The spectrum.
+    camera : Camera
+
+    Returns
+    -------
+    (..., b) float64
+        Means weighted by each band's response.
+    """
+    wavelength, values = np.asarray(wavelength_nm, float), np.asarray(values, float)
+    means = np.empty((*values.shape[:-1], len(camera)))
+    flat = [k for k, band in enumerate(camera) if not band.response]
+    if flat:
+        centre, width = np.array(
+            [(camera.bands[k].centre_nm, camera.bands[k].width_nm) for k in flat]
+        ).T
+        means[..., flat] = window_mean(
+            wavelength, values, centre - 0.5 * width, centre + 0.5 * width
+        )
+    for k, band in enumerate(camera):
+        if band.response:
+            at, response = np.array(band.response).T
+            nodes = np.union1d(at, wavelength[(wavelength > at[0]) & (wavelength < at[-1])])
+            weight = np.interp(nodes, at, response)
+            weight /= np.trapezoid(weight, nodes)
+            at_nodes = _between(wavelength, values, nodes)
+            means[..., k] = np.trapezoid(at_nodes * weight, nodes, axis=-1)
+    return means
+
+
+def _between(wavelength: np.ndarray, values: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """Values (..., m) of a piecewise linear spectrum at other wavelengths (m,)."""
+    right = np.clip(np.searchsorted(wavelength, nodes), 1, len(wavelength) - 1)
+    share = (nodes - wavelength[right - 1]) / (wavelength[right] - wavelength[right - 1])
+    return values[..., right - 1] * (1 - share) + values[..., right] * share
 
 
 def photon_flux(irradiance_w_m2: np.ndarray, wavelength_nm: np.ndarray) -> np.ndarray:

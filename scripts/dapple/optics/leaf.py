@@ -7,13 +7,9 @@ import numpy as np
 from dapple.errors import InputError
 from dapple.findings import Finding
 from dapple.optics import spectrum_table
-from dapple.optics.bands import (
-    CAMERA_HALF_WIDTH_NM,
-    CAMERA_NM,
-    band_mean,
-    camera_windows,
-    window_mean,
-)
+from dapple.optics.bands import band_mean, camera_mean
+from dapple.optics.cameras import Camera
+from dapple.optics.default_spectra import LEAF
 
 # What PROSPECT was calibrated on, generously: beyond it the model runs, and means nothing.
 LEAF_RANGES = {
@@ -30,19 +26,16 @@ LEAF_RANGES = {
 def leaf_spectra(
     wavelength_nm: np.ndarray,
     *,
-    n: float = 1.5,
-    chlorophyll_ug_cm2: float = 45.0,
-    carotenoids_ug_cm2: float = 9.0,
-    anthocyanin_ug_cm2: float = 0.0,
-    brown: float = 0.0,
-    water_cm: float = 0.012,
-    dry_matter_g_cm2: float = 0.006,
+    n: float = LEAF["n"],
+    chlorophyll_ug_cm2: float = LEAF["chlorophyll_ug_cm2"],
+    carotenoids_ug_cm2: float = LEAF["carotenoids_ug_cm2"],
+    anthocyanin_ug_cm2: float = LEAF["anthocyanin_ug_cm2"],
+    brown: float = LEAF["brown"],
+    water_cm: float = LEAF["water_cm"],
+    dry_matter_g_cm2: float = LEAF["dry_matter_g_cm2"],
     prospect_version: str = "D",
 ) -> tuple[np.ndarray, np.ndarray]:
     """Reflectance and transmittance of a leaf, averaged over each band.
-
-    The defaults stand for a healthy, mature apple leaf. They are assumed, not measured on
-    any tree; in the PAR band only chlorophyll matters much.
 
     Parameters
     ----------
@@ -126,28 +119,18 @@ def measured_leaf(
 
 
 def camera_leaves(
-    *,
-    n: np.ndarray | float = 1.5,
-    chlorophyll_ug_cm2: np.ndarray | float = 45.0,
-    carotenoids_ug_cm2: np.ndarray | float = 9.0,
-    anthocyanin_ug_cm2: np.ndarray | float = 0.0,
-    brown: np.ndarray | float = 0.0,
-    water_cm: np.ndarray | float = 0.012,
-    dry_matter_g_cm2: np.ndarray | float = 0.006,
-    prospect_version: str = "D",
-    centres_nm: np.ndarray = CAMERA_NM,
-    half_width_nm: np.ndarray = CAMERA_HALF_WIDTH_NM,
+    camera: Camera, *, prospect_version: str = "D", **leaf: np.ndarray | float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Reflectance and transmittance of many leaves in the bands of a camera.
 
     Parameters
     ----------
-    n, chlorophyll_ug_cm2, ..., dry_matter_g_cm2 : float or (k,) array
-        As in `leaf_spectra`; they are broadcast against each other.
+    camera : Camera
+        Its bands lie within 400 to 2500 nm.
     prospect_version : {"5", "D"}
         Which calibration of the absorption coefficients.
-    centres_nm, half_width_nm : (b,) float
-        Bands [nm], flat from centre minus to centre plus half the width, within 400 to 2500.
+    **leaf : float or (k,) array
+        Parameters of `leaf_spectra`, broadcast against each other.
 
     Returns
     -------
@@ -157,20 +140,16 @@ def camera_leaves(
     Raises
     ------
     InputError
-        A parameter is outside the range in `LEAF_RANGES`.
+        A parameter is unknown or outside the range in `LEAF_RANGES`.
     """
-    columns = np.broadcast_arrays(
-        *np.atleast_1d(
-            n, chlorophyll_ug_cm2, carotenoids_ug_cm2, anthocyanin_ug_cm2, brown, water_cm,
-            dry_matter_g_cm2,
-        )
-    )  # fmt: skip
-    low, high = camera_windows(centres_nm, half_width_nm)
-    both = np.empty((2, len(columns[0]), len(low)))
+    if unknown := set(leaf) - set(LEAF):
+        raise InputError("leaf", min(unknown), f"one of {', '.join(LEAF)}", "Correct the name.")
+    columns = np.broadcast_arrays(*np.atleast_1d(*(LEAF | leaf).values()))
+    both = np.empty((2, len(columns[0]), len(camera)))
     for k, row in enumerate(zip(*columns, strict=True)):
-        leaf = {name: float(value) for name, value in zip(LEAF_RANGES, row, strict=True)}
-        table_nm, *spectra = _prospect(leaf, prospect_version)
-        both[:, k] = window_mean(table_nm, np.array(spectra), low, high)
+        one = {name: float(value) for name, value in zip(LEAF, row, strict=True)}
+        table_nm, *spectra = _prospect(one, prospect_version)
+        both[:, k] = camera_mean(table_nm, np.array(spectra), camera)
     return both[0], both[1]
 
 

@@ -6,12 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from dapple.errors import InputError
-from dapple.optics.bands import (
-    CAMERA_HALF_WIDTH_NM,
-    CAMERA_NM,
-    camera_windows,
-    window_mean,
-)
+from dapple.optics.bands import camera_mean
+from dapple.optics.cameras import Camera
 
 GSV_NM = np.arange(400.0, 2501.0, 10.0)
 DRY_VECTORS, MOISTURE_VECTOR = "DryVec.txt", "SMVec.txt"
@@ -59,10 +55,9 @@ def read_gsv(folder: str | Path) -> tuple[np.ndarray, np.ndarray]:
 def gsv(
     dry: np.ndarray,
     moisture_vector: np.ndarray,
+    camera: Camera,
     *,
     shape: tuple[float, float] = (0.0, 0.0),
-    centres_nm: np.ndarray = CAMERA_NM,
-    half_width_nm: np.ndarray = CAMERA_HALF_WIDTH_NM,
 ) -> Soil:
     """A soil made of the general spectral vectors.
 
@@ -70,10 +65,9 @@ def gsv(
     ----------
     dry, moisture_vector : (3, 211), (211,) float
         See `read_gsv`.
+    camera : Camera
     shape : two floats
         Second and third dry coefficient, as shares of the first.
-    centres_nm, half_width_nm : (b,) float
-        Bands [nm].
 
     Returns
     -------
@@ -92,9 +86,8 @@ def gsv(
     At m = 1 the soil has lost 35 to 44 % of its reflectance in the camera's bands and all of it
     in the water bands near 2 µm, which is why m is taken as a share of saturation.
     """
-    low, high = camera_windows(centres_nm, half_width_nm)
-    line = window_mean(GSV_NM, dry[0] + shape[0] * dry[1] + shape[1] * dry[2], low, high)
-    water = window_mean(GSV_NM, moisture_vector, low, high)
+    line = camera_mean(GSV_NM, dry[0] + shape[0] * dry[1] + shape[1] * dry[2], camera)
+    water = camera_mean(GSV_NM, moisture_vector, camera)
 
     def reflectance(brightness: np.ndarray, moisture: np.ndarray) -> np.ndarray:
         bright, wet = np.broadcast_arrays(*np.atleast_1d(brightness, moisture))
@@ -103,15 +96,12 @@ def gsv(
     return reflectance
 
 
-def two_soils(
-    *, centres_nm: np.ndarray = CAMERA_NM, half_width_nm: np.ndarray = CAMERA_HALF_WIDTH_NM
-) -> Soil:
+def two_soils(camera: Camera) -> Soil:
     """A mixture of the dry and the wet soil that come with the Python package `prosail`.
 
     Parameters
     ----------
-    centres_nm, half_width_nm : (b,) float
-        Bands [nm].
+    camera : Camera
 
     Returns
     -------
@@ -121,10 +111,9 @@ def two_soils(
     """
     import prosail
 
-    low, high = camera_windows(centres_nm, half_width_nm)
     soils = prosail.spectral_lib.soil
     table_nm = np.arange(400.0, 2501.0)
-    dry, wet = window_mean(table_nm, np.array([soils.rsoil1, soils.rsoil2]), low, high)
+    dry, wet = camera_mean(table_nm, np.array([soils.rsoil1, soils.rsoil2]), camera)
 
     def reflectance(brightness: np.ndarray, moisture: np.ndarray) -> np.ndarray:
         bright, share = np.broadcast_arrays(*np.atleast_1d(brightness, moisture))
@@ -134,6 +123,6 @@ def two_soils(
     return reflectance
 
 
-def choose(folder: str | Path = "") -> Soil:
+def choose(camera: Camera, folder: str | Path = "") -> Soil:
     """The soil model: GSV where a folder with its vectors is given, else prosail's two soils."""
-    return gsv(*read_gsv(folder)) if str(folder) else two_soils()
+    return gsv(*read_gsv(folder), camera) if str(folder) else two_soils(camera)

@@ -11,17 +11,6 @@ from dapple.findings import Finding
 from dapple.optics import spectrum_table
 from dapple.optics.bands import band_mean
 
-# Assumed, not measured: between measured branches of birch and larch (0.07 to 0.18, spectral
-# database of LESS, Qi et al. 2019) and the bark colour of the published apple tree (red 0.37,
-# green 0.36, blue 0.33; Frey et al. 2025).
-BARK = {"wavelength_nm": (400.0, 550.0, 700.0), "reflectance": (0.10, 0.18, 0.26)}
-
-# Assumed, typical of green grass in summer: dark in blue and red, a green peak, the red edge.
-MEADOW = {
-    "wavelength_nm": (400.0, 500.0, 550.0, 600.0, 680.0, 700.0),
-    "reflectance": (0.03, 0.05, 0.10, 0.07, 0.05, 0.12),
-}
-
 Spectrum = float | str | Path | Mapping[str, object]
 COLUMNS = {"wavelength_column", "reflectance_column", "decimal"}
 

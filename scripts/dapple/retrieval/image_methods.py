@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from dapple.optics.cameras import Camera
 from dapple.retrieval import coefficients, comparison, semiless, spectra
 from dapple.retrieval.coefficients import Coefficients
 from dapple.retrieval.comparison import Means
 from dapple.retrieval.rendered_images import Renderer
 from dapple.retrieval.semiless import Fitted
 from dapple.retrieval.spectra import Spectra
-from dapple.retrieval.training_entries import BANDS
 from dapple.scene.scene_optics import Optics
 from dapple.streams import stream_seed
 
@@ -54,7 +54,7 @@ def render_all(
     for k in range(-1, len(properties)):  # the first is not counted: kernels are compiled
         row = max(k, 0)
         optics = Optics.of_tree(
-            np.array(BANDS, float),
+            np.zeros(len(bark)),
             properties.leaf_reflectance[row],
             properties.leaf_transmittance[row],
             np.asarray(bark),
@@ -132,6 +132,7 @@ def errors(
     means: Mapping[str, Means],
     reference: Means,
     leaves_and_soils: Mapping[str, Any],
+    camera: Camera,
     seed: int,
 ) -> pd.DataFrame:
     """Every method against renders; Semi-LESS against collision orders for single N.
@@ -145,34 +146,43 @@ def errors(
         Of the renders.
     leaves_and_soils : mapping
         See `spectra.combinations`.
+    camera : Camera
     seed : int
     """
     parts = [
-        comparison.compare(own, reference, BANDS).assign(method=name, reference="direct")
+        comparison.compare(own, reference, camera.names).assign(method=name, reference="direct")
         for name, own in means.items()
     ]
     for structure in STRUCTURES:
         _, properties = spectra.combinations(
-            leaves_and_soils, PER_STRUCTURE, seed=stream_seed(seed, "structure"), n=structure
+            leaves_and_soils,
+            PER_STRUCTURE,
+            camera,
+            seed=stream_seed(seed, "structure"),
+            n=structure,
         )
         own = images.means(properties)
         exact = own["collision_orders"]
         # The same paths: they differ without noise.
         exact = Means(exact.cells, np.zeros_like(exact.variance), exact.pixels)
-        table = comparison.compare(own["semi_less"], exact, BANDS)
+        table = comparison.compare(own["semi_less"], exact, camera.names)
         names = {"method": f"semi_less_n_{structure}", "reference": "collision_orders"}
         parts.append(table.assign(**names))
     return pd.concat(parts)[["method", "reference", *parts[0].columns[:-2]]]
 
 
 def per_combination(
-    drawn: pd.DataFrame, properties: Spectra, reference: Means, means: Mapping[str, Means]
+    drawn: pd.DataFrame,
+    properties: Spectra,
+    camera: Camera,
+    reference: Means,
+    means: Mapping[str, Means],
 ) -> pd.DataFrame:
     """One row per combination and band: what went in, and image means of all methods."""
     rows = []
     all_means = {"direct": reference.image} | {name: own.image for name, own in means.items()}
     for k in range(len(drawn)):
-        for b, band in enumerate(BANDS):
+        for b, band in enumerate(camera.names):
             row = {"combination": k, **drawn.iloc[k], "band": band}
             row["leaf_reflectance"] = properties.leaf_reflectance[k, b]
             row["leaf_transmittance"] = properties.leaf_transmittance[k, b]

@@ -102,7 +102,7 @@ def canopy(
 def ensemble(
     networks: Sequence[network.Network], features: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and standard deviation (n,) over networks of what they predict from bands (n, 5)."""
+    """Mean and standard deviation (n,) over networks of what they predict from bands (n, b)."""
     each = np.array([network.predict(one, features) for one in networks])
     return each.mean(axis=0), each.std(axis=0)
 
@@ -119,7 +119,7 @@ def retrieve(
     ----------
     networks, interval, taught
         Trained on one kind of pixels.
-    bands : (5, rows, columns) float
+    bands : (b, rows, columns) float
         Means of such pixels in observed cells, NaN where there are none.
 
     Returns

@@ -1,4 +1,4 @@
-"""A residual network from five bands to leaf chlorophyll, in JAX on the CPU."""
+"""A residual network from the bands of a camera to leaf chlorophyll, in JAX on the CPU."""
 
 import os
 from collections.abc import Iterator
@@ -30,7 +30,7 @@ class Network:
         Layers in order, float32.
     block : int
         Number of layers inside the residual block, which end at the last hidden layer.
-    feature_mean, feature_scale : (5,) float32
+    feature_mean, feature_scale : (b,) float32
         Features are shifted and divided by them.
     low, high : float
         Targets at which the sigmoid is 0 and 1.
@@ -123,7 +123,7 @@ def train(
 
     Parameters
     ----------
-    features, validation_features : (n, 5) float32
+    features, validation_features : (n, b) float32
         Bands.
     target, validation_target : (n,) float
         What to predict, such as chlorophyll [µg cm⁻²].
@@ -208,7 +208,7 @@ def train(
 
 
 def predict(network: Network, features: np.ndarray) -> np.ndarray:
-    """Predict the target (n,), float64, from bands (n, 5); NaN where a band is NaN."""
+    """Predict the target (n,), float64, from bands (n, b); NaN where a band is NaN."""
     x = (np.asarray(features, np.float32) - network.feature_mean) / network.feature_scale
     scaled = _scaled_prediction(network.weights, x, network.block)
     return network.low + (network.high - network.low) * scaled.astype(np.float64)

@@ -23,29 +23,15 @@ class Range:
         return (self.high - self.low) / max(self.levels - 1, 1)
 
 
-# Ranges: Zhao et al. (2025). Names: those of PROSPECT's arguments in optics/leaf.py.
-TABLE: dict[str, Range] = {
-    "n": Range(1.0, 2.5, 4),
-    "chlorophyll_ug_cm2": Range(10.0, 70.0, 13),
-    "dry_matter_g_cm2": Range(0.0, 0.03, 4),
-    "brown": Range(0.0, 0.8, 5),
-    "soil_brightness": Range(0.01, 0.7, 4),
-    "soil_moisture": Range(0.01, 0.78, 4),
-}
-CHLOROPHYLL_PER_CAROTENOID = 4.0
-ANTHOCYANIN_PER_CHLOROPHYLL = 0.043
-WATER_CM = 0.015
-
-
 def draw(
     n_combinations: int,
     *,
     seed: int,
-    table: Mapping[str, Range] = TABLE,
-    jitter_steps: float = 0.5,
-    chlorophyll_per_carotenoid: float = CHLOROPHYLL_PER_CAROTENOID,
-    anthocyanin_per_chlorophyll: float = ANTHOCYANIN_PER_CHLOROPHYLL,
-    water_cm: float = WATER_CM,
+    table: Mapping[str, Range],
+    jitter_steps: float,
+    chlorophyll_per_carotenoid: float,
+    anthocyanin_per_chlorophyll: float,
+    water_cm: float,
 ) -> pd.DataFrame:
     """Draw combinations of leaf and soil parameters.
 
@@ -56,7 +42,7 @@ def draw(
     seed : int
         Of the random order and jitter.
     table : mapping of str to Range
-        The parameters that vary.
+        The parameters that vary: PROSPECT's (`optics.leaf`), `soil_brightness`, `soil_moisture`.
     jitter_steps : float
         Standard deviation of the Gaussian jitter, in grid steps.
     chlorophyll_per_carotenoid : float

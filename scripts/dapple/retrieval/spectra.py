@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from dapple.optics.cameras import Camera
 from dapple.optics.leaf import LEAF_RANGES, camera_leaves
 from dapple.optics.soil import Soil, choose
 from dapple.retrieval import parameters
@@ -23,7 +24,7 @@ class Spectra:
 
 
 def combinations(
-    settings: dict, number: int, *, seed: int, **fixed: float
+    settings: dict, number: int, camera: Camera, *, seed: int, **fixed: float
 ) -> tuple[pd.DataFrame, Spectra]:
     """Draw combinations of leaf and soil, and compute their spectra.
 
@@ -35,6 +36,8 @@ def combinations(
         `prospect_version` and `shoot_recollision`.
     number : int
         How many.
+    camera : Camera
+        For whose bands.
     seed : int
     **fixed : float
         Parameters that do not vary.
@@ -57,7 +60,8 @@ def combinations(
     )
     return drawn, spectra(
         drawn,
-        choose(settings["soil_vectors"]),
+        choose(camera, settings["soil_vectors"]),
+        camera,
         prospect_version=settings["prospect_version"],
         shoot_recollision=settings["shoot_recollision"],
     )
@@ -66,6 +70,7 @@ def combinations(
 def spectra(
     drawn: pd.DataFrame,
     soil: Soil,
+    camera: Camera,
     *,
     prospect_version: str = "D",
     shoot_recollision: float = 0.0,
@@ -78,6 +83,8 @@ def spectra(
         From `parameters.draw`: PROSPECT's arguments, `soil_brightness`, `soil_moisture`.
     soil : callable
         From `optics.soil`: brightness and moisture (n,) to reflectance (n, b).
+    camera : Camera
+        Of the same bands as the soil.
     prospect_version : {"5", "D"}
         Calibration of PROSPECT. To "5" the anthocyanin of green leaves is part of chlorophyll.
     shoot_recollision : float
@@ -90,7 +97,7 @@ def spectra(
     leaf = {name: drawn[name].to_numpy(float) for name in LEAF_RANGES if name in drawn}
     if prospect_version == "5":
         leaf["anthocyanin_ug_cm2"] = 0.0
-    reflectance, transmittance = camera_leaves(**leaf, prospect_version=prospect_version)
+    reflectance, transmittance = camera_leaves(camera, **leaf, prospect_version=prospect_version)
     reflectance, transmittance = of_shoots(reflectance, transmittance, shoot_recollision)
     ground = soil(drawn["soil_brightness"].to_numpy(float), drawn["soil_moisture"].to_numpy(float))
     return Spectra(reflectance, transmittance, ground)

@@ -1,6 +1,6 @@
 """From images to entries: sunlit or all canopy pixels, averaged over cells of a few metres."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numba
@@ -9,10 +9,6 @@ import pandas as pd
 
 from dapple.errors import InputError
 
-BANDS = ("450", "560", "650", "730", "840")
-NEAR_INFRARED = 4
-SUNLIT_NIR = 0.25
-"""Near-infrared reflectance above which a pixel is sunlit (Zhao et al. 2025)."""
 MASKS = ("sunlit", "all")
 
 Chunks = Iterable[tuple[slice, np.ndarray]]
@@ -56,20 +52,22 @@ def chunks_of(image: np.ndarray) -> Chunks:
 
 
 def select(
-    image: np.ndarray, canopy: np.ndarray, *, mask: str, sunlit_nir: float = SUNLIT_NIR
+    image: np.ndarray, canopy: np.ndarray, *, mask: str, near_infrared: int, sunlit_nir: float
 ) -> np.ndarray:
     """Choose pixels of an image as `aggregate` does, to look at them.
 
     Parameters
     ----------
-    image : (5, rows, columns) float
+    image : (b, rows, columns) float
         Reflectance, NaN where there are no data.
     canopy : (rows, columns) bool
         Pixels that see the canopy.
     mask : {"sunlit", "all"}
         Canopy pixels whose near-infrared reflectance is above the threshold, or all of them.
+    near_infrared : int
+        Number of that band.
     sunlit_nir : float
-        The threshold.
+        The threshold; 0.25 in Zhao et al. (2025).
 
     Returns
     -------
@@ -77,7 +75,7 @@ def select(
         Only pixels with data in every band are chosen.
     """
     known = canopy & np.isfinite(image).all(axis=0)
-    return known & (np.nan_to_num(image[NEAR_INFRARED]) > _threshold(mask, sunlit_nir))
+    return known & (np.nan_to_num(image[near_infrared]) > _threshold(mask, sunlit_nir))
 
 
 def aggregate(
@@ -85,9 +83,10 @@ def aggregate(
     canopy: np.ndarray,
     over: Cells,
     *,
+    near_infrared: int,
+    sunlit_nir: float,
+    min_share: float,
     masks: tuple[str, ...] = MASKS,
-    sunlit_nir: float = SUNLIT_NIR,
-    min_share: float = 0.02,
 ) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Average chosen pixels of images, observed or simulated, over cells.
 
@@ -98,12 +97,12 @@ def aggregate(
     canopy : (rows, columns) bool
         Pixels that see the canopy.
     over : Cells
-    masks : tuple of {"sunlit", "all"}
+    near_infrared, sunlit_nir : int, float
         See `select`.
-    sunlit_nir : float
-        Threshold of near-infrared reflectance.
     min_share : float
         Chosen pixels that a cell must have, as a share of a whole cell.
+    masks : tuple of {"sunlit", "all"}
+        See `select`.
 
     Returns
     -------
@@ -127,7 +126,7 @@ def aggregate(
         if pixels.start != done or pixels.stop > len(flat):
             break
         done = pixels.stop
-        _add(values, flat[pixels], over.of_pixel[pixels], thresholds, sums, count)
+        _add(values, flat[pixels], over.of_pixel[pixels], near_infrared, thresholds, sums, count)
     if sums is None or done != len(flat) or len(over.of_pixel) != len(flat):
         raise InputError(
             "images", f"{done} pixels", f"the {len(flat)} of the canopy mask, in their order",
@@ -152,7 +151,7 @@ def _threshold(mask: str, sunlit_nir: float) -> float:
 
 
 @numba.njit(cache=True)
-def _add(values, canopy, cell, thresholds, sums, count):
+def _add(values, canopy, cell, near_infrared, thresholds, sums, count):
     """Pixel after pixel in one order, so that sums are the same on every run."""
     n_pixels, n_images, n_bands = values.shape
     for p in range(n_pixels):
@@ -165,7 +164,7 @@ def _add(values, canopy, cell, thresholds, sums, count):
             if not known:
                 continue
             for m in range(len(thresholds)):
-                if values[p, k, NEAR_INFRARED] > thresholds[m]:
+                if values[p, k, near_infrared] > thresholds[m]:
                     count[m, cell[p], k] += 1
                     for b in range(n_bands):
                         sums[m, cell[p], k, b] += values[p, k, b]
@@ -175,6 +174,7 @@ def entries(
     means: np.ndarray,
     count: np.ndarray,
     parameters: pd.DataFrame,
+    bands: Sequence[str],
     *,
     max_entries: int | None = None,
     seed: int = 0,
@@ -184,10 +184,12 @@ def entries(
 
     Parameters
     ----------
-    means, count : (n, 5, rows, columns) and (n, rows, columns)
+    means, count : (n, b, rows, columns) and (n, rows, columns)
         From `aggregate`.
     parameters : DataFrame
         Leaf and soil of the n images.
+    bands : (b,) sequence of str
+        Their names.
     max_entries : int or None
         Keep so many, drawn by chance.
     seed : int
@@ -211,7 +213,7 @@ def entries(
             where, f"{len(means)} images", f"{len(parameters)}, one per combination",
             "Make the images again.",
         )  # fmt: skip
-    frame = table(means, count)
+    frame = table(means, count, bands)
     if frame.empty:
         raise InputError(
             where, "no cell with enough canopy pixels", "canopy in the images",
@@ -225,16 +227,16 @@ def entries(
     return pd.concat([frame, of_entry.astype(np.float32)], axis=1)
 
 
-def table(means: np.ndarray, count: np.ndarray) -> pd.DataFrame:
+def table(means: np.ndarray, count: np.ndarray, bands: Sequence[str]) -> pd.DataFrame:
     """Cells that have a mean: bands (float32), `combination`, `row`, `column`, `pixels`."""
     k, row, column = np.nonzero(np.isfinite(means).all(axis=1))
-    frame = pd.DataFrame(means[k, :, row, column], columns=list(BANDS))
+    frame = pd.DataFrame(means[k, :, row, column], columns=list(bands))
     numbers = {"combination": k, "row": row, "column": column, "pixels": count[k, row, column]}
     for name, values in numbers.items():
         frame[name] = values.astype(np.int32)
     return frame
 
 
-def features(frame: pd.DataFrame) -> np.ndarray:
-    """The bands of a table (n, 5), float32."""
-    return frame[list(BANDS)].to_numpy(np.float32)
+def features(frame: pd.DataFrame, bands: Sequence[str]) -> np.ndarray:
+    """The bands of a table (n, b), float32."""
+    return frame[list(bands)].to_numpy(np.float32)

@@ -13,8 +13,9 @@ from dapple.errors import InputError
 from dapple.findings import Finding
 from dapple.formats import netcdf
 from dapple.optics.bands import par_bands
+from dapple.optics.default_spectra import BARK, MEADOW
 from dapple.optics.leaf import leaf_spectra, measured_leaf
-from dapple.optics.surface_spectra import BARK, MEADOW, Spectrum, reflectance
+from dapple.optics.surface_spectra import Spectrum, reflectance
 
 LEAF_FILE = {
     "path",

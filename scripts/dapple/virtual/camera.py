@@ -33,8 +33,8 @@ SUN_WEIGHT = 8.0
 
 
 @dataclass(frozen=True)
-class Camera:
-    """An orthographic camera that looks straight down on whole pixels of a north-up grid.
+class View:
+    """Looking straight down, without perspective, on whole pixels of a north-up grid.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Camera:
     pixel_m: float
 
     @classmethod
-    def over(cls, size_m: tuple[float, float], pixel_m: float) -> "Camera":
+    def over(cls, size_m: tuple[float, float], pixel_m: float) -> "View":
         """The whole pixels of a plot from 0, 0 to its size, from the north-west corner."""
         columns, rows = (int(edge / pixel_m + 1e-6) for edge in size_m)
         if rows < 1 or columns < 1:
@@ -124,7 +124,7 @@ def build(mesh: Mesh, materials: Materials, *, variant: str = "llvm_ad_rgb") -> 
 
 def photograph(
     scene: PaintedScene,
-    camera: Camera,
+    view: View,
     *,
     sun_zenith_deg: float,
     sun_azimuth_deg: float,
@@ -137,7 +137,7 @@ def photograph(
     Parameters
     ----------
     scene : PaintedScene
-    camera : Camera
+    view : View
     sun_zenith_deg, sun_azimuth_deg : float
         Azimuth clockwise from north [°].
     diffuse_share : (b,) float
@@ -167,32 +167,32 @@ def photograph(
             "Give one share for each band.",
         )
     towards_sun = direction_from_angles(sun_zenith_deg, sun_azimuth_deg)
-    image = np.empty((n_bands, camera.rows * camera.columns), np.float32)
+    image = np.empty((n_bands, view.rows * view.columns), np.float32)
     for first, paths in zip(range(0, n_bands, 3), paths_per_pixel, strict=True):
         bands = list(range(first, min(first + 3, n_bands)))
         padded = np.array([bands[min(k, len(bands) - 1)] for k in range(3)])
         scene.paint(bands)
         scene.render.set_sun(towards_sun, (1 - diffuse[padded]) / towards_sun[2])
         scene.render.set_sky(lambda zenith, azimuth: np.ones_like(zenith), diffuse[padded])
-        seen = _expose(scene, camera, paths, stream_seed(seed, "bands", first))
+        seen = _expose(scene, view, paths, stream_seed(seed, "bands", first))
         image[bands] = np.pi * seen[: len(bands)]
-    return image.reshape(n_bands, camera.rows, camera.columns)
+    return image.reshape(n_bands, view.rows, view.columns)
 
 
-def _expose(scene: PaintedScene, camera: Camera, paths: int, seed: int) -> np.ndarray:
+def _expose(scene: PaintedScene, view: View, paths: int, seed: int) -> np.ndarray:
     """Radiance (3, pixels) in the colours that the scene is painted with."""
     mi = scene.render.mi
     tracer = mi.load_dict({"type": "path", "max_depth": -1, "rr_depth": ROULETTE_DEPTH})
     sampler = mi.load_dict({"type": "independent"})
-    n_pixels, at_once = camera.rows * camera.columns, max(CHUNK_RAYS // paths, 1)
+    n_pixels, at_once = view.rows * view.columns, max(CHUNK_RAYS // paths, 1)
     radiance = np.empty((3, n_pixels))
     for number, begin in enumerate(range(0, n_pixels, at_once)):
         pixel = np.arange(begin, min(begin + at_once, n_pixels))
         own = stream_seed(seed, number)
-        row, column = np.divmod(pixel, camera.columns)
+        row, column = np.divmod(pixel, view.columns)
         place = patterns.shifted(paths, 2, (len(pixel),), own)
-        x = camera.left_m + (column[:, None] + place[..., 0]) * camera.pixel_m
-        y = camera.top_m - (row[:, None] + place[..., 1]) * camera.pixel_m
+        x = view.left_m + (column[:, None] + place[..., 0]) * view.pixel_m
+        y = view.top_m - (row[:, None] + place[..., 1]) * view.pixel_m
         start = mi.Point3f(
             mi.Float(x.ravel().astype(np.float32)),
             mi.Float(y.ravel().astype(np.float32)),

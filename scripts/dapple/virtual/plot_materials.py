@@ -7,6 +7,8 @@ import numpy as np
 import pandas as pd
 
 from dapple.formats.meshes import Mesh, concatenate
+from dapple.optics.cameras import Camera
+from dapple.optics.default_spectra import CONIFER_BARK
 from dapple.virtual import plot_optics, plots
 from dapple.virtual.plot_optics import Materials
 
@@ -16,6 +18,7 @@ def assemble(
     grown_leaves: Sequence[Mesh],
     grown_wood: Sequence[Mesh],
     terrain: Mesh,
+    camera: Camera,
     *,
     lowest_to_highest_lcc: float,
     lcc_layers: int,
@@ -32,6 +35,8 @@ def assemble(
     grown_leaves, grown_wood : sequence of Mesh
         Of the trees that all others are copies of.
     terrain : Mesh
+    camera : Camera
+        For whose bands.
     lowest_to_highest_lcc : float
         Chlorophyll of the lowest layer of a crown over that of the highest.
     lcc_layers : int
@@ -46,11 +51,11 @@ def assemble(
     wood, _ = plots.place(list(grown_wood), trees)
     n_layers = lcc_layers if lowest_to_highest_lcc != 1 else 1
     (reflectance, transmittance), of_leaf = _needles(
-        grown_leaves, trees, n_layers, lowest_to_highest_lcc, water_cm
+        grown_leaves, trees, camera, n_layers, lowest_to_highest_lcc, water_cm
     )
-    bark = plot_optics.table_in_bands(plot_optics.BARK_NM, plot_optics.BARK)
+    bark = plot_optics.in_bands(CONIFER_BARK, camera)
     centres = terrain.vertices_m[terrain.faces, :2].mean(axis=1)
-    soil = plot_optics.ground_patches(centres, **ground, seed=ground_seed)
+    soil = plot_optics.ground_patches(centres, camera, **ground, seed=ground_seed)
     n = len(reflectance)
     of_face = [
         of_leaf[leaves.element],
@@ -66,7 +71,12 @@ def assemble(
 
 
 def _needles(
-    grown: Sequence[Mesh], trees: pd.DataFrame, n_layers: int, ratio: float, water_cm: float
+    grown: Sequence[Mesh],
+    trees: pd.DataFrame,
+    camera: Camera,
+    n_layers: int,
+    ratio: float,
+    water_cm: float,
 ) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
     """Optics (trees x layers, bands) of needles, and the row of every shoot of the plot."""
     layer = [plot_optics.layers(mesh, n_layers) for mesh in grown]
@@ -81,4 +91,4 @@ def _needles(
         for name in ("structure_n", "dry_matter_g_cm2", "brown")
     }
     rows = [row * n_layers + layer[tree.grown] for row, tree in enumerate(trees.itertuples())]
-    return plot_optics.needles(lcc, water_cm=water_cm, **chemistry), np.concatenate(rows)
+    return plot_optics.needles(lcc, camera, water_cm=water_cm, **chemistry), np.concatenate(rows)

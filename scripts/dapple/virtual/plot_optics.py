@@ -1,5 +1,6 @@
 """Optical properties of a virtual plot: needles by tree and height, bark, and ground in patches."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,17 +8,11 @@ from scipy.stats import truncnorm
 
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
-from dapple.optics.bands import CAMERA_HALF_WIDTH_NM, CAMERA_NM, camera_windows, window_mean
+from dapple.optics.bands import camera_mean
+from dapple.optics.cameras import Camera
+from dapple.optics.default_spectra import LITTER
 from dapple.optics.leaf import camera_leaves
 from dapple.optics.soil import two_soils
-
-# Assumed: rough bark of conifers, browner and brighter towards the infrared.
-BARK_NM = (400.0, 450.0, 560.0, 650.0, 730.0, 840.0, 900.0)
-BARK = (0.06, 0.07, 0.11, 0.16, 0.23, 0.31, 0.34)
-
-# Assumed: dry litter of needles, without the green peak and the steep red edge of living leaves.
-LITTER_NM = (400.0, 450.0, 560.0, 650.0, 730.0, 840.0, 900.0)
-LITTER = (0.05, 0.06, 0.11, 0.17, 0.23, 0.31, 0.34)
 
 
 @dataclass(frozen=True)
@@ -40,15 +35,12 @@ class Materials:
 def chlorophyll(
     n: int,
     *,
-    mean_ug_cm2: float = 39.9,
-    sd_ug_cm2: float = 10.8,
-    range_ug_cm2: tuple[float, float] = (10.0, 70.0),
+    mean_ug_cm2: float,
+    sd_ug_cm2: float,
+    range_ug_cm2: tuple[float, float],
     seed: int,
 ) -> np.ndarray:
-    """Leaf chlorophyll content (n,) of trees: a normal distribution cut off at a range [µg cm⁻²].
-
-    The defaults are those of the larches of Zhao et al. (2025).
-    """
+    """Leaf chlorophyll content (n,) of trees: normal, cut off at a range [µg cm⁻²]."""
     low, high = range_ug_cm2
     if not (sd_ug_cm2 > 0 and low < mean_ug_cm2 < high):
         raise InputError(
@@ -97,15 +89,17 @@ def layer_factor(
 
 def needles(
     lcc_ug_cm2: np.ndarray,
+    camera: Camera,
     *,
-    structure_n: np.ndarray | float = 1.6,
-    dry_matter_g_cm2: np.ndarray | float = 0.012,
-    brown: np.ndarray | float = 0.05,
-    water_cm: float = 0.015,
+    structure_n: np.ndarray | float,
+    dry_matter_g_cm2: np.ndarray | float,
+    brown: np.ndarray | float,
+    water_cm: float,
     carotenoids_per_chlorophyll: float = 0.25,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Reflectance and transmittance (n, 5) of needles with chlorophyll (n,), by PROSPECT-5."""
+    """Reflectance and transmittance (n, b) of needles with chlorophyll (n,), by PROSPECT-5."""
     return camera_leaves(
+        camera,
         n=structure_n,
         chlorophyll_ug_cm2=lcc_ug_cm2,
         carotenoids_ug_cm2=carotenoids_per_chlorophyll * np.asarray(lcc_ug_cm2),
@@ -116,23 +110,23 @@ def needles(
     )
 
 
-def table_in_bands(wavelength_nm, reflectance) -> np.ndarray:
-    """A tabulated spectrum in the bands of the camera (5,)."""
-    low, high = camera_windows(CAMERA_NM, CAMERA_HALF_WIDTH_NM)
-    return window_mean(np.asarray(wavelength_nm), np.asarray(reflectance), low, high)
+def in_bands(spectrum: Mapping[str, Sequence[float]], camera: Camera) -> np.ndarray:
+    """A spectrum of `optics.default_spectra` in the bands of a camera (b,)."""
+    return camera_mean(spectrum["wavelength_nm"], spectrum["reflectance"], camera)
 
 
 def ground_patches(
     centres_m: np.ndarray,
+    camera: Camera,
     *,
-    brightness: float = 0.55,
-    moisture: float = 0.4,
-    litter_share: float = 0.4,
-    variation: float = 0.2,
+    brightness: float,
+    moisture: float,
+    litter_share: float,
+    variation: float,
     patch_m: float = 2.5,
     seed: int,
 ) -> np.ndarray:
-    """Reflectance (n, 5) of the ground at places (n, 2), in patches.
+    """Reflectance (n, b) of the ground at places (n, 2), in patches.
 
     Soil of `optics.soil.two_soils` mixes with litter of needles. Two smooth textures vary them:
     one the moisture of the soil, one the share of litter.
@@ -141,6 +135,7 @@ def ground_patches(
     ----------
     centres_m : (n, 2) float64
         Places [m].
+    camera : Camera
     brightness, moisture, litter_share : float
         Means: of the soil's brightness and moisture, 0 to 1, and of the ground under litter.
     variation : float
@@ -151,9 +146,9 @@ def ground_patches(
     """
     moist = np.clip(moisture + variation * _texture(centres_m, 2 * patch_m, seed), 0, 1)
     litter = np.clip(litter_share + variation * _texture(centres_m, patch_m, seed + 1), 0, 1)
-    soil = two_soils()(np.full(len(moist), brightness), moist)
+    soil = two_soils(camera)(np.full(len(moist), brightness), moist)
     litter = litter[:, None]
-    return (1 - litter) * soil + litter * table_in_bands(LITTER_NM, LITTER)
+    return (1 - litter) * soil + litter * in_bands(LITTER, camera)
 
 
 def _texture(xy_m: np.ndarray, width_m: float, seed: int, n_waves: int = 40) -> np.ndarray:

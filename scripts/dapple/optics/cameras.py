@@ -1,0 +1,129 @@
+"""Multispectral cameras: a band a row."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from dapple.errors import InputError
+
+NEAR_INFRARED_NM = (760.0, 1000.0)
+RED_EDGE_NM = 700.0
+"""Leaves absorb most light of shorter waves and scatter most of longer ones."""
+
+
+@dataclass(frozen=True)
+class Band:
+    """A band of a camera.
+
+    Attributes
+    ----------
+    name : str
+        As in images and tables.
+    centre_nm, width_nm : float
+        The band is flat from half the width below to half the width above its centre [nm].
+    response : tuple of (float, float)
+        Instead: wavelengths [nm], ascending, and relative response there, linear between.
+    """
+
+    name: str
+    centre_nm: float
+    width_nm: float
+    response: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Bands in the order of their images."""
+
+    bands: tuple[Band, ...]
+
+    def __len__(self) -> int:
+        return len(self.bands)
+
+    def __iter__(self) -> Iterator[Band]:
+        return iter(self.bands)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all bands."""
+        return tuple(band.name for band in self.bands)
+
+    def at_centres(self, spectrum: Sequence[tuple[float, float]]) -> tuple[float, ...]:
+        """Values at the centres of the bands.
+
+        Parameters
+        ----------
+        spectrum : sequence of (float, float)
+            Wavelengths [nm], ascending, and values: linear between, the same beyond the ends.
+        """
+        found = []
+        for band in self.bands:
+            below = [point for point in spectrum if point[0] <= band.centre_nm]
+            above = [point for point in spectrum if point[0] >= band.centre_nm]
+            (low, first), (high, last) = (below or above[:1])[-1], (above or below[-1:])[0]
+            share = (band.centre_nm - low) / (high - low) if high > low else 0.0
+            found.append(first + share * (last - first))
+        return tuple(found)
+
+    def is_infrared(self, first: int) -> bool:
+        """Whether one of three bands, traced together, is one that leaves scatter."""
+        return any(band.centre_nm > RED_EDGE_NM for band in self.bands[first : first + 3])
+
+    @property
+    def near_infrared(self) -> int:
+        """Number of the first near infrared band, which tells sunlit from shaded leaves.
+
+        Raises
+        ------
+        InputError
+            The camera has none.
+        """
+        low, high = NEAR_INFRARED_NM
+        for number, band in enumerate(self.bands):
+            if low <= band.centre_nm <= high:
+                return number
+        raise InputError(
+            "chlorophyll.bands",
+            f"centres at {', '.join(f'{band.centre_nm:g}' for band in self.bands)} nm",
+            f"a band between {low:g} and {high:g} nm, by which sunlit leaves are known",
+            "Add the near infrared band of the camera.",
+        )
+
+
+ZHAO = Camera(
+    (
+        Band("450", 450.0, 32.0),
+        Band("560", 560.0, 32.0),
+        Band("650", 650.0, 32.0),
+        Band("730", 730.0, 32.0),
+        Band("840", 840.0, 52.0),
+    )
+)
+"""Blue, green, red, red edge and near infrared of a multispectral UAV camera (Zhao et al. 2025)."""
+
+
+def camera(rows: Sequence[tuple[str, float, float]], responses: str | Path = "") -> Camera:
+    """A camera from a table.
+
+    Parameters
+    ----------
+    rows : sequence of (str, float, float)
+        Name, centre and width [nm] of each band.
+    responses : path or ""
+        CSV of response curves: `wavelength_nm` and a column of each band's name; bands that it
+        does not name stay flat.
+    """
+    bands = tuple(Band(*row) for row in rows)
+    if not responses:
+        return Camera(bands)
+    # Needs pandas, which the configuration, where bands have their defaults from, does without.
+    from dapple.formats import tables
+
+    table = tables.read(responses).sort_values("wavelength_nm")
+    curves = {
+        name: tuple(zip(table["wavelength_nm"], table[name], strict=True))
+        for name in table.columns.intersection([band.name for band in bands])
+    }
+    return Camera(
+        tuple(Band(b.name, b.centre_nm, b.width_nm, curves.get(b.name, ())) for b in bands)
+    )
