@@ -71,6 +71,8 @@ def main() -> None:
             records,
             sky_at=sky_at,
             max_shift_m=settings.registration.max_shift_m,
+            sun_diameter_deg=settings.light.sun_diameter_deg,
+            aperture_m=settings.light.aperture_m,
             max_clock_offset_s=options.clock,
             # all records that are given fit: the last time alone reports, and nothing reads it
             split_by="time",

@@ -33,9 +33,11 @@ from dapple.light.timestep_series import Reference
 from dapple.scene import scene_files, scene_optics, traced
 from dapple.scene.surfaces import LEAF, WOOD, Scene
 from dapple.sky.open_sky import level_beam, open_sky_par
+from dapple.sky.solar_disc import SUN_DIAMETER_DEG
 
 TIMED = ("load", "direct", "paths", "bands_and_write")
 KINDS = ("polygons", "voxels_0.2", "voxels_1.0")
+KERNEL_DEG = 8.0
 REFERENCE_RAYS = {
     "replicates": 16,
     "direct_rays": 64,
@@ -81,7 +83,8 @@ def once(folder: Path, variant: str, tolerance: float) -> dict[str, float]:
         max_shadow_rays=1 << 16,
         tolerance=tolerance,
         max_growth=64,
-        sun_diameter_deg=rays.SUN_DIAMETER_DEG,
+        sun_diameter_deg=SUN_DIAMETER_DEG,
+        sun_kernel_deg=KERNEL_DEG,
     )
     clock.append(time.perf_counter())
     sunlit = steps.sun(scene, sensors, sky, model, tracing, seed=1)
@@ -138,7 +141,7 @@ def against_reference(folder: Path, scene: Scene, fast: dict, variant: str, n_co
             optics,
             bands=3,
             **scaled,
-            sun_diameter_deg=rays.SUN_DIAMETER_DEG,
+            sun_diameter_deg=SUN_DIAMETER_DEG,
             aperture_m=0.0,
             variant=variant,
             seed=7,

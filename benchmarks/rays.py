@@ -16,8 +16,7 @@ from dapple.light import rays_to_sky
 from dapple.scene import patterns, traced
 from dapple.scene.surfaces import Scene
 from dapple.sky.open_sky import towards_sun
-
-SUN_DIAMETER_DEG = 0.533
+from dapple.sky.solar_disc import SUN_DIAMETER_DEG
 
 
 def shadow_rays(scene: Scene, variant: str, n_sensors: int = 72, n_times: int = 100) -> dict:

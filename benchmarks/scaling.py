@@ -27,6 +27,7 @@ from dapple import steps
 from dapple.light.light_model import Model, Tracing
 from dapple.scene import traced
 from dapple.scene.surfaces import Scene
+from dapple.sky.solar_disc import SUN_DIAMETER_DEG
 
 BASE = {"triangles": 350_000, "sensors": 72, "times": 30, "trees": 1}
 AXES = {
@@ -89,7 +90,10 @@ def run(scene: traced.TracedScene, n_sensors: int, n_times: int) -> np.ndarray:
     """Wall and processor seconds (3, 2) of shadow rays, paths, and the product with all bands."""
     sensors, sky, optics = crown.sensors(n_sensors), crown.sky(n_times), crown.optics()
     model = Model(sky_patches=577, max_orders=30, bands=len(optics))
-    tracing = Tracing(paths=1024, sky_rays=8192, max_shadow_rays=256, tolerance=2.0)
+    tracing = Tracing(
+        paths=1024, sky_rays=8192, max_shadow_rays=256, tolerance=2.0,
+        sun_diameter_deg=SUN_DIAMETER_DEG, sun_kernel_deg=8.0,
+    )  # fmt: skip
     clock = [now()]
     sunlit = steps.sun(scene, sensors, sky, model, tracing, seed=1)
     clock.append(now())

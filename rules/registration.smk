@@ -35,6 +35,8 @@ if settings.registration.fit:
             **SKY,
             sensors=settings.sensors.table(),
             records=settings.measured.table(),
+            sun_diameter_deg=settings.light.sun_diameter_deg,
+            aperture_m=settings.light.aperture_m,
             variant=f"{VARIANT}_rgb",
             seed=stream("registration"),
         message:

@@ -30,6 +30,8 @@ def main(snakemake):
         max_clock_offset_s=params.max_clock_offset_s,
         split_by=params.split,
         fit_share=params.fit_share,
+        sun_diameter_deg=params.sun_diameter_deg,
+        aperture_m=params.aperture_m,
         variant=params.variant,
         seed=params.seed,
     )

@@ -188,21 +188,24 @@ def paths(
         Sky patches and orders count.
     tracing : Tracing
     optics : Optics or None
-        Nominal spectra by which errors are judged, where rays are added until they are small.
+        Nominal spectra by which errors are judged; where they are given and `tracing` allows it,
+        rays are added until errors are small.
     seed : int
     """
+    growth = None
+    if optics is not None and tracing.max_growth > 1:
+        growth = transport.Growth(
+            tracing.path_tolerance, tracing.max_growth, optics, tracing.sun_kernel_deg
+        )
     return transport.collect(
         scene,
         sensors_m,
         n_paths=tracing.paths,
         n_sky_rays=tracing.sky_rays,
-        max_growth=tracing.max_growth,
-        tolerance=tracing.path_tolerance,
         n_patches=model.sky_patches,
         max_orders=model.max_orders,
-        sun_kernel_deg=tracing.sun_kernel_deg,
+        growth=growth,
         aperture_m=tracing.aperture_m,
-        optics=optics,
         seed=seed,
     )
 

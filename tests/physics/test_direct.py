@@ -10,14 +10,16 @@ from dapple.light import rays_to_sky
 from dapple.light.visibility import sunlit
 from dapple.scene import traced
 from dapple.scene.surfaces import Scene, of_kinds
+from dapple.sky.solar_disc import SUN_DIAMETER_DEG
 
 SENSOR = np.array([[0.0, 0.0, 0.5]])
 UP = np.array([[0.0, 0.0, 1.0]])
-SUN_RADIUS = np.radians(0.5 * 0.533)
+SUN_RADIUS = np.radians(0.5 * SUN_DIAMETER_DEG)
 
 
 def see(scene, sensors_m, directions, **more):
-    settings = {"tolerance": 1e-3, "max_rays": 1 << 16, "seed": 1, **more}
+    settings = {"tolerance": 1e-3, "max_rays": 1 << 16, "seed": 1}
+    settings |= {"sun_diameter_deg": SUN_DIAMETER_DEG, **more}
     return sunlit(traced.load(scene), sensors_m, directions, **settings)
 
 

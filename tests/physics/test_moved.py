@@ -10,6 +10,7 @@ from dapple.light import light_datasets
 from dapple.light.moved_sensors import moved_light
 from dapple.scene import traced
 from dapple.scene.surfaces import Scene, of_kinds
+from dapple.sky.solar_disc import SUN_DIAMETER_DEG
 
 BEAM, SKY = 1500.0, 200.0
 SENSOR = np.array([[0.0, 0.0, 0.5]])
@@ -44,6 +45,14 @@ def shaded():
 def test_a_sensor_that_stands_beside_its_shade_gets_the_whole_beam(shift_m, beam):
     light, sky = shaded()
     scene = traced.load(plate(0.5))
-    moved = moved_light([scene, scene], SENSOR, light, sky, shift_m=shift_m, seed=3)
+    moved = moved_light(
+        [scene, scene],
+        SENSOR,
+        light,
+        sky,
+        shift_m=shift_m,
+        seed=3,
+        sun_diameter_deg=SUN_DIAMETER_DEG,
+    )
     assert moved["par_direct_umol_m2_s"].item() == pytest.approx(beam, abs=1e-6 * BEAM)
     assert moved["par_umol_m2_s"].item() == pytest.approx(SKY + beam)

@@ -8,6 +8,7 @@ densely the tree was scanned: polygons grow with every beam, voxels do not.
 import pytest
 
 from dapple.config.settings import Settings
+from dapple.sky.solar_disc import SUN_DIAMETER_DEG
 from dapple.stability import outcome
 from dapple.stability.chain import Chain
 from dapple.stability.stressors import Conditions
@@ -29,7 +30,7 @@ LIGHT = {
         "sky_rays": 2320,
         "paths": 512,
         "max_shadow_rays": 512,
-        "sun_diameter_deg": 0.533,
+        "sun_diameter_deg": SUN_DIAMETER_DEG,
         "aperture_m": 0.0,
         "sun_kernel_deg": 8.0,
     },

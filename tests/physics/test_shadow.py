@@ -7,8 +7,9 @@ import xarray as xr
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
 from dapple.light import rays_to_sky
-from dapple.light.rays_to_sky import sky_visibility, sun_visibility
+from dapple.light.rays_to_sky import Tracer
 from dapple.scene.surfaces import Scene, of_kinds
+from dapple.sky.solar_disc import SUN_DIAMETER_DEG
 
 UP = np.array([[0.0, 0.0, 1.0]])
 
@@ -43,6 +44,16 @@ def directions(zenith_deg, azimuth_deg=0.0):
     return np.stack([np.sin(z) * np.sin(a), np.sin(z) * np.cos(a), np.cos(z)], axis=-1)
 
 
+def sun_visibility(scene, points_m, ways, **more):
+    return Tracer(scene).sun_visibility(
+        points_m, ways, **{"sun_diameter_deg": SUN_DIAMETER_DEG, **more}
+    )
+
+
+def sky_visibility(scene, points_m, **more):
+    return Tracer(scene).sky_visibility(points_m, **more)
+
+
 def test_an_open_place_sees_all_of_the_sun_and_none_after_sunset():
     seen = sun_visibility(
         Scene(), np.zeros((3, 3)), directions([0.0, 89.0, 91.0]), n_disc=8, seed=1
@@ -51,7 +62,7 @@ def test_an_open_place_sees_all_of_the_sun_and_none_after_sunset():
 
 
 def test_the_penumbra_of_an_edge_is_the_part_of_the_disc_beside_it():
-    height, radius = 4.0, 4.0 * np.tan(np.radians(0.265))
+    height, radius = 4.0, 4.0 * np.tan(np.radians(0.5 * SUN_DIAMETER_DEG))
     scene = Scene(of_kinds(leaf=rectangle((0.0, 50.0), (-50.0, 50.0), height)))
     edge = np.linspace(-1.2, 1.2, 13)  # distance into the shade in radii of the sun
     points = np.column_stack([edge * radius, np.zeros(13), np.zeros(13)])
@@ -79,7 +90,7 @@ def test_a_turbid_layer_transmits_by_its_slant_depth(leaf_area_index):
         directions(zenith, 137.0),
         n_disc=16,
         seed=3,
-        angular_diameter_deg=0.0,
+        sun_diameter_deg=0.0,
     )[0]
     expected = np.exp(-0.5 * leaf_area_index / np.cos(np.radians(zenith)))
     assert seen == pytest.approx(expected, rel=2e-4)
@@ -93,7 +104,7 @@ def test_every_voxel_stands_where_its_coordinates_say():
     scene = Scene(voxels=voxels(density, size, low))
     way = directions([20.0, 55.0, 10.0, 0.0], [40.0, 250.0, 135.0, 0.0])
     points = low + rng.random((60, 3)) * [2.0, 1.2, 1.6] - [0.0, 0.0, 1.0]
-    seen = sun_visibility(scene, points, way, n_disc=1, seed=5, angular_diameter_deg=0.0)
+    seen = sun_visibility(scene, points, way, n_disc=1, seed=5, sun_diameter_deg=0.0)
     t = (np.arange(8000) + 0.5) * 5.0 / 8000
     for i, point in enumerate(points):
         for j, d in enumerate(way):

@@ -12,6 +12,7 @@ from dapple.scene import mitsuba_scene, traced
 from dapple.scene.counters import Counters
 from dapple.scene.scene_optics import Optics
 from dapple.scene.surfaces import Scene, Surface
+from dapple.sky.solar_disc import SUN_DIAMETER_DEG
 
 SENSORS = np.array([[0.0, 0.0, 0.3], [0.9, -0.4, 0.3]])
 APPLE_PLACES = np.array([[-0.6, 0.0, 0.0], [0.8, 0.5, 0.2], [0.1, -0.9, 0.1]])
@@ -88,7 +89,8 @@ def by_timestep(scene, leaf):
         beam_normal=np.zeros(1),
         diffuse_horizontal=np.array([np.pi]),
         sky=lambda zenith, azimuth: np.ones_like(zenith),
-        effort=Effort(sky=1024, scattered=1024, max_depth=200, roulette_depth=20),
+        sun_diameter_deg=SUN_DIAMETER_DEG,
+        effort=Effort(16, 1, 1024, 1024, max_depth=200, roulette_depth=20),
         seed=1,
     )
     return found["total"][:, 0], found["standard_error"][:, 0]

@@ -6,9 +6,9 @@ import pytest
 from scipy.special import expn
 from tests.physics.slab import layer, transmitted_irradiance, turbid_slab
 
-from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
 from dapple.light import paths, tensor, transport
+from dapple.light.transport import Growth
 from dapple.scene import traced
 from dapple.scene.scene_optics import Optics
 from dapple.scene.surfaces import Scene, Surface, of_kinds
@@ -257,23 +257,17 @@ def test_bands_summed_with_their_light_are_the_sum_of_all_bands():
 def test_more_paths_start_where_the_light_is_uncertain_until_it_is_not():
     sensors = np.array([[0.0, 0.0, 0.5], [400.0, 0.0, 0.5]])
     scene, leaf = Scene(of_kinds(leaf=leaf_cloud())), optics(0.1, 0.05, ground=0.2)
-    settings = {"n_paths": 512, "optics": leaf, "tolerance": 0.002}
-    counted = collect(scene, sensors, **settings)
+    counted = collect(scene, sensors, n_paths=512, growth=Growth(0.002, 64.0, leaf, 8.0))
     assert counted.n_paths[0] > 4 * counted.n_paths[1]
     assert counted.n_paths[1] == 32
     assert tensor.nominal_error(counted, leaf, sun_kernel_deg=8.0).max() < 0.002
-    capped = collect(scene, sensors, **settings, max_growth=2.0)
+    capped = collect(scene, sensors, n_paths=512, growth=Growth(0.002, 2.0, leaf, 8.0))
     assert capped.n_paths[0] == 64
-
-
-def test_a_tolerance_without_optics_is_an_error_that_says_so():
-    with pytest.raises(InputError, match="no optics"):
-        collect(Scene(), tolerance=0.01)
 
 
 def test_paths_added_later_are_those_that_would_have_been_traced_at_once():
     scene, leaf = Scene(of_kinds(leaf=leaf_cloud())), optics(0.1, 0.05, ground=0.2)
-    grown = collect(scene, n_paths=512, optics=leaf, tolerance=0.002)
+    grown = collect(scene, n_paths=512, growth=Growth(0.002, 64.0, leaf, 8.0))
     at_once = collect(scene, n_paths=int(grown.n_paths[0]) * grown.n_replicates)
     assert grown.n_paths[0] > 32
     for name in COLUMNS[1:]:

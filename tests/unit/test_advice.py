@@ -19,6 +19,7 @@ from dapple.scene import traced
 from dapple.scene.scene_optics import Optics
 from dapple.scene.surfaces import Scene, of_kinds
 from dapple.sky.open_sky import open_sky_par
+from dapple.sky.solar_disc import SUN_DIAMETER_DEG
 
 WAVELENGTH = np.linspace(400, 700, 7)
 OPTICS = Optics.of_tree(
@@ -56,7 +57,14 @@ def a_pilot(minutes=(0, 60, 120), finest=None):
         sky_at(list(minutes)),
         OPTICS,
         finest=finest or Model(bands=7, sky_patches=577),
-        tracing=Tracing(paths=2048, sky_rays=9232, max_shadow_rays=1024),
+        tracing=Tracing(
+            paths=2048,
+            sky_rays=9232,
+            max_shadow_rays=1024,
+            tolerance=0.005,
+            sun_diameter_deg=SUN_DIAMETER_DEG,
+            sun_kernel_deg=8.0,
+        ),
         repeats=1,
         seed=3,
     )
@@ -151,7 +159,7 @@ def parts(direct, paths, products):
     }
 
 
-FINEST = Model(step_min=10.0)
+FINEST = Model(max_orders=12, step_min=10.0)
 FULL = parts(10.0, 20.0, 1.0)
 EFFECTS = [
     Effect("sun", "point", 0.1, 0.0, 0.0, parts(1.0, 20.0, 1.0)),

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from annotated_types import Ge, Gt, Le
 
 from dapple.config.base import Count, NotNegative, Positive, Section, key
+from dapple.sky.solar_disc import SUN_DIAMETER_DEG
 
 
 class Transport(Section):
@@ -50,7 +51,9 @@ class Light(Section):
     )
     check: bool = key(True, "compare the transport engine with the per-timestep engine")
     variant: Literal["llvm", "cuda"] = key("llvm", "Mitsuba on the processor or on an NVIDIA GPU")
-    sun_diameter_deg: NotNegative = key(0.533, "angular diameter of the solar disc; 0: a point")
+    sun_diameter_deg: NotNegative = key(
+        SUN_DIAMETER_DEG, "angular diameter of the solar disc; 0: a point"
+    )
     aperture_m: NotNegative = key(0.0, "diameter of the sensors' receiving discs; 0: points")
     transport: Transport = Transport()
     timestep: Timestep = Timestep()

@@ -38,7 +38,7 @@ class Model:
     sun: str = "disc"
     sky_patches: int = 2305
     sky: str = "perez"
-    max_orders: int = 12
+    max_orders: int = 255
     ground: str = "lambertian"
     bands: int = 61
     step_min: float = 0.0
@@ -50,7 +50,7 @@ class Model:
 
 @dataclass(frozen=True)
 class Tracing:
-    """How many rays are traced, whatever the model, and what of.
+    """How many rays are traced, whatever the model, and what of; a stage is told what it needs.
 
     Attributes
     ----------
@@ -67,14 +67,14 @@ class Tracing:
         As in `visibility.sunlit` and `tensor.sun_radiance`.
     """
 
-    paths: int = 16_384
-    sky_rays: int = 16_384
-    max_shadow_rays: int = 16_384
-    tolerance: float = 0.005
+    paths: int = 0
+    sky_rays: int = 0
+    max_shadow_rays: int = 0
+    tolerance: float = np.nan
     max_growth: float = 1.0
-    sun_diameter_deg: float = 0.533
+    sun_diameter_deg: float = np.nan
+    sun_kernel_deg: float = np.nan
     aperture_m: float = 0.0
-    sun_kernel_deg: float = 8.0
 
     @property
     def sun_tolerance(self) -> float:
@@ -82,9 +82,9 @@ class Tracing:
         return DIRECT_SHARE * self.tolerance
 
     @property
-    def path_tolerance(self) -> float | None:
-        """Standard error of sky and scattered light at which paths are enough; None: any is."""
-        return PATH_SHARE * self.tolerance if self.max_growth > 1 else None
+    def path_tolerance(self) -> float:
+        """Standard error of sky and scattered light at which paths are enough."""
+        return PATH_SHARE * self.tolerance
 
     def finer(self, factor: int) -> "Tracing":
         """With so many times as many rays, and the error that goes with them."""

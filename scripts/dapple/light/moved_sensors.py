@@ -17,17 +17,24 @@ def sideways(places_m: np.ndarray, distance_m: float, seed: int) -> np.ndarray:
     return places_m + distance_m * way
 
 
+SHIFT_M = 0.1
+"""How far sensors are moved to see how much their light depends on where they stand [m]."""
+
+MAX_RAYS, TOLERANCE = 128, 0.02
+"""Shadow rays that are enough to see a difference, and the standard error of the share they see."""
+
+
 def moved_light(
     scenes: Iterable[TracedScene],
     sensors_m: np.ndarray,
     light: xr.Dataset,
     sky: xr.Dataset,
     *,
-    shift_m: float,
     seed: int,
-    max_rays: int = 128,
-    tolerance: float = 0.02,
-    sun_diameter_deg: float = 0.533,
+    sun_diameter_deg: float,
+    shift_m: float = SHIFT_M,
+    max_rays: int = MAX_RAYS,
+    tolerance: float = TOLERANCE,
     aperture_m: float = 0.0,
 ) -> xr.Dataset:
     """Light at sensors that are moved sideways, each in its own direction.
@@ -44,12 +51,14 @@ def moved_light(
         Light at the sensors.
     sky : Dataset
         Sun and sky at the same times.
-    shift_m : float
-        How far they are moved [m].
     seed : int
         Chooses the directions and shifts the rays.
-    max_rays, tolerance, sun_diameter_deg, aperture_m
-        As in `direct.sunlit`.
+    sun_diameter_deg : float
+        Angular diameter of the disc [deg].
+    shift_m : float
+        How far they are moved [m].
+    max_rays, tolerance, aperture_m
+        As in `visibility.sunlit`.
 
     Returns
     -------

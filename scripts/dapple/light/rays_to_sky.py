@@ -170,7 +170,7 @@ class Tracer:
         *,
         n_disc: int,
         seed: int,
-        angular_diameter_deg: float = 0.53,
+        sun_diameter_deg: float,
         aperture_m: float = 0.0,
     ) -> np.ndarray:
         """Share of the sun's disc that each point sees in each direction of the sun.
@@ -185,8 +185,8 @@ class Tracer:
             Rays per point and direction, evenly spread over the disc.
         seed : int
             Turns the pattern differently for each point and direction.
-        angular_diameter_deg : float
-            Of the sun [deg].
+        sun_diameter_deg : float
+            Angular diameter of the disc [deg].
         aperture_m : float
             Diameter of the level entrance around each point [m]; 0 is a point.
 
@@ -200,7 +200,7 @@ class Tracer:
             self.scene,
             points_m,
             sun_directions,
-            sun_diameter_deg=angular_diameter_deg,
+            sun_diameter_deg=sun_diameter_deg,
             aperture_m=aperture_m,
             seed=seed,
         )
@@ -225,35 +225,6 @@ class Tracer:
         """
         trace = sky_rays(self.scene, points_m, patches(1), seed=seed)
         return trace(np.arange(len(points_m)), 1, 0, n)[:, 0, 0] / np.float32(n)
-
-
-def sun_visibility(
-    scene: Scene,
-    points_m: np.ndarray,
-    sun_directions: np.ndarray,
-    *,
-    n_disc: int,
-    seed: int,
-    angular_diameter_deg: float = 0.53,
-    aperture_m: float = 0.0,
-    variant: str = "llvm_ad_rgb",
-) -> np.ndarray:
-    """`Tracer.sun_visibility` for one call."""
-    return Tracer(scene, variant).sun_visibility(
-        points_m,
-        sun_directions,
-        n_disc=n_disc,
-        seed=seed,
-        angular_diameter_deg=angular_diameter_deg,
-        aperture_m=aperture_m,
-    )
-
-
-def sky_visibility(
-    scene: Scene, points_m: np.ndarray, *, n: int, seed: int, variant: str = "llvm_ad_rgb"
-) -> np.ndarray:
-    """`Tracer.sky_visibility` for one call."""
-    return Tracer(scene, variant).sky_visibility(points_m, n=n, seed=seed)
 
 
 def _columns(mi, values: np.ndarray) -> list:

@@ -25,6 +25,8 @@ from dapple.scene.render_scene import RenderScene
 from dapple.sky.sky_radiance import relative_radiance
 from dapple.streams import stream_seed
 
+POINT_SINE = 1e-4
+"""Of the radius of a sun that is taken for a point: a disc too small to tell."""
 LIFT_M = 1e-3
 """A sensor that lies on the ground is lifted by this much, so that its rays leave the ground."""
 
@@ -45,11 +47,11 @@ class Effort:
         From this depth on weak paths are ended by chance (Mitsuba's `rr_depth`).
     """
 
-    replicates: int = 16
-    direct: int = 128
-    sky: int = 128
-    scattered: int = 64
-    max_depth: int = 8
+    replicates: int
+    direct: int
+    sky: int
+    scattered: int
+    max_depth: int
     roulette_depth: int = 2
 
     def __post_init__(self) -> None:
@@ -71,6 +73,7 @@ def timestep(
     beam_normal: np.ndarray,
     diffuse_horizontal: np.ndarray,
     sky: np.ndarray | Callable[[np.ndarray, np.ndarray], np.ndarray],
+    sun_diameter_deg: float,
     effort: Effort,
     seed: int,
     aperture_m: float = 0.0,
@@ -92,6 +95,8 @@ def timestep(
     sky : (5,) array or callable
         Coefficients of Perez et al. (1993) (`sky_radiance.relative_radiance`; zeros: isotropic), or
         relative radiance as a function of zenith and azimuth [deg].
+    sun_diameter_deg : float
+        Angular diameter of the sun's disc; 0 is a point [deg].
     effort : Effort
     seed : int
     aperture_m : float
@@ -119,8 +124,9 @@ def timestep(
     parts = {"direct": dark, "sky": dark, "scattered": dark}
     if beam.any() or diffuse.any():
         if beam.any():
-            scene.set_even_sky(beam / (np.pi * np.sin(scene.sun_radius_rad) ** 2))
-            parts["direct"] = _direct(scene, sensors, towards_sun, effort, aperture_m, seed)
+            sine = max(np.sin(np.radians(0.5 * sun_diameter_deg)), POINT_SINE)
+            scene.set_even_sky(beam / (np.pi * sine**2))
+            parts["direct"] = _direct(scene, sensors, towards_sun, sine, effort, aperture_m, seed)
         scene.set_sun(towards_sun, beam)
         scene.set_sky(_radiance_function(sky, sun_zenith_deg, sun_azimuth_deg), diffuse)
         for part in ("sky", "scattered") if diffuse.any() else ("scattered",):
@@ -152,16 +158,16 @@ def _direct(
     scene: RenderScene,
     sensors: np.ndarray,
     towards_sun: np.ndarray,
+    sine: float,
     effort: Effort,
     aperture_m: float,
     seed: int,
 ) -> np.ndarray:
-    """(n, replicates, 3) irradiance by rays to points of the sun's disc."""
+    """(n, replicates, 3) irradiance by rays to points of the sun's disc, its radius a sine."""
     seed = stream_seed(seed, "direct")
     square = patterns.shifted(effort.direct, 4, (len(sensors), effort.replicates), seed)
     start = _starts(sensors, square[..., 2:], aperture_m)
     # even in the disc as it is seen from below: the cosine with its axis weighs solid angle
-    sine = np.sin(scene.sun_radius_rad)
     flat = sine * patterns.disc(square[..., :2])
     axial = np.sqrt(1.0 - (flat**2).sum(axis=-1, keepdims=True))
     way = flat @ _across(towards_sun) + axial * towards_sun

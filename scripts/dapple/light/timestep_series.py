@@ -67,13 +67,7 @@ class Reference:
     def rendered(self) -> list[RenderScene]:
         """The scenes as Mitsuba has them."""
         return [
-            mitsuba_scene.build(
-                scene,
-                self.optics,
-                variant=self.variant,
-                sun_diameter_deg=self.sun_diameter_deg,
-            )
-            for scene in self.scenes
+            mitsuba_scene.build(scene, self.optics, variant=self.variant) for scene in self.scenes
         ]
 
     def at(self, index: int, sensors: pd.DataFrame) -> xr.Dataset:
@@ -88,6 +82,7 @@ class Reference:
                 beam_normal=group_flux(self.beam[index], self.group, self.n_bands),
                 diffuse_horizontal=group_flux(self.diffuse[index], self.group, self.n_bands),
                 sky=self.sky["perez"][index].to_numpy(),
+                sun_diameter_deg=self.sun_diameter_deg,
                 effort=self.effort,
                 aperture_m=self.aperture_m,
                 seed=stream_seed(self.seed, placement, index),

@@ -4,12 +4,11 @@ What comes out serves every sky, spectrum and time (`dapple.light.tensor`).
 """
 
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import dataclass, fields
 
 import numpy as np
 import pandas as pd
 
-from dapple.errors import InputError
 from dapple.light.paths import Paths, trace
 from dapple.light.rays_to_sky import sky_rays
 from dapple.light.tensor import Transport, nominal_error, nominal_straight_error
@@ -23,6 +22,28 @@ N_REPLICATES = 16
 """Independent sets of paths; their spread gives the standard error."""
 
 
+@dataclass(frozen=True)
+class Growth:
+    """When more is traced than at first: where light is less certain than asked for.
+
+    Attributes
+    ----------
+    tolerance : float
+        Standard error under nominal skies, as a share of the open sky's light.
+    largest : float
+        At most so many times the rays and paths of the beginning.
+    optics : Optics
+        Typical ones, by which the standard error is judged.
+    sun_kernel_deg : float
+        See `sun_radiance`.
+    """
+
+    tolerance: float
+    largest: float
+    optics: Optics
+    sun_kernel_deg: float
+
+
 def collect(
     scene: TracedScene,
     sensors_m: np.ndarray,
@@ -32,10 +53,7 @@ def collect(
     max_orders: int,
     seed: int,
     n_sky_rays: int = 8192,
-    tolerance: float | None = None,
-    max_growth: float = 64.0,
-    optics: Optics | None = None,
-    sun_kernel_deg: float = 8.0,
+    growth: Growth | None = None,
     halved_after: int | None = None,
     aperture_m: float = 0.0,
     n_replicates: int = N_REPLICATES,
@@ -58,15 +76,8 @@ def collect(
         Of the random numbers.
     n_sky_rays : int
         Straight rays to the sky of each sensor at first, at least one to a patch and replicate.
-    tolerance : float or None
-        From sensors whose standard error under a nominal sky is larger, as a share of the open
-        sky's light, more rays and paths are traced. None: the first are enough.
-    max_growth : float
-        At most so many times the rays and paths of the beginning.
-    optics : Optics or None
-        Typical optics by which the standard error is judged; needed where there is a tolerance.
-    sun_kernel_deg : float
-        See `sun_radiance`.
+    growth : Growth or None
+        When more rays and paths are traced. None: the first are enough.
     halved_after, aperture_m
         See `paths.trace`. Rays to the sky start at the middle of the aperture.
     n_replicates : int
@@ -76,19 +87,8 @@ def collect(
     -------
     Transport
         The same for the same seed, whatever the number of threads.
-
-    Raises
-    ------
-    InputError
-        A tolerance without optics.
     """
-    if tolerance is not None and optics is None:
-        raise InputError(
-            "tolerance", "no optics", "typical optics", "Give those of an ordinary leaf and ground."
-        )
     sky = patches(n_patches)
-    # Straight and scattered light are traced apart; their variances add.
-    half = None if tolerance is None else tolerance / np.sqrt(2)
 
     def look(done: np.ndarray, wanted: np.ndarray, seen: np.ndarray | None) -> np.ndarray:
         rays = sky_rays(scene, sensors_m, sky, seed=stream_seed(seed, "sky"))
@@ -116,13 +116,12 @@ def collect(
         return more if counted is None else _added(counted, more)
 
     def scattered_error(counted: Transport) -> np.ndarray:
-        return nominal_error(counted, optics, sun_kernel_deg=sun_kernel_deg)
+        return nominal_error(counted, growth.optics, sun_kernel_deg=growth.sun_kernel_deg)
 
     n = len(sensors_m)
-    seen = _grown(
-        look, nominal_straight_error, -(-n_sky_rays // (n_replicates * sky.n)), n, half, max_growth
-    )
-    return _grown(count, scattered_error, -(-n_paths // n_replicates), n, half, max_growth)
+    first = -(-n_sky_rays // (n_replicates * sky.n)), -(-n_paths // n_replicates)
+    seen = _grown(look, nominal_straight_error, first[0], n, growth)
+    return _grown(count, scattered_error, first[1], n, growth)
 
 
 def _grown(
@@ -130,17 +129,18 @@ def _grown(
     error_of: Callable,
     first: int,
     n: int,
-    tolerance: float | None,
-    max_growth: float,
+    growth: Growth | None,
 ):
     """Add samples where the error is too large, until it is not or there are enough of them."""
     done = np.full(n, first)
     found = add(np.zeros_like(done), done, None)
-    while tolerance is not None:
+    while growth is not None:
+        # Straight and scattered light are traced apart; their variances add.
+        tolerance = growth.tolerance / np.sqrt(2)
         error = error_of(found)
         # Errors fall with the root of the samples; a fifth more, since the error is an estimate.
         needed = np.ceil(1.2 * done * (error / tolerance) ** 2 / first).astype(np.int64) * first
-        wanted = np.clip(needed, done, int(max_growth * first))
+        wanted = np.clip(needed, done, int(growth.largest * first))
         wanted = np.where(error > tolerance, wanted, done)
         if (wanted == done).all():
             break

@@ -40,8 +40,8 @@ def sunlit(
     tolerance: float,
     max_rays: int,
     seed: int,
+    sun_diameter_deg: float,
     n_replicates: int = 8,
-    sun_diameter_deg: float = 0.533,
     aperture_m: float = 0.0,
 ) -> Sunlit:
     """Trace shadow rays to the sun's disc, more of them where it is partly hidden.
@@ -60,10 +60,10 @@ def sunlit(
         Most rays of a sensor at a time, of all replicates.
     seed : int
         Shifts the pattern of each sensor, time and replicate.
-    n_replicates : int
-        Independent sets of rays, at least 2.
     sun_diameter_deg : float
         Angular diameter of the disc [deg].
+    n_replicates : int
+        Independent sets of rays, at least 2.
     aperture_m : float
         Diameter of the sensors' level receiving discs [m].
 

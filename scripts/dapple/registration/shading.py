@@ -10,7 +10,7 @@ import xarray as xr
 from dapple.light import rays_to_sky
 from dapple.registration import fit
 from dapple.scene.surfaces import Scene
-from dapple.sky.open_sky import towards_sun
+from dapple.sky.open_sky import level_beam, towards_sun
 
 FINE_STEP_S = 120.0
 """Times of the simulated shade; the sun moves by half its disc in a minute."""
@@ -28,6 +28,8 @@ def register(
     max_clock_offset_s: float,
     split_by: str,
     fit_share: float,
+    sun_diameter_deg: float,
+    aperture_m: float,
     variant: str,
     seed: int,
 ) -> dict:
@@ -49,6 +51,8 @@ def register(
         Half width of the search [m], [s].
     split_by, fit_share : str, float
         The part of the records that fits; the rest reports.
+    sun_diameter_deg, aperture_m : float
+        Angular diameter of the sun [deg], diameter of the sensors' receiving discs [m].
 
     Returns
     -------
@@ -66,8 +70,10 @@ def register(
     )
     sky = sky_at(fine)
     sun = towards_sun(sky)
-    beam = sky["beam_normal_umol_m2_s"].sum("band").to_numpy() * np.maximum(sun[:, 2], 0)
+    beam = level_beam(sky)
     diffuse = sky["diffuse_horizontal_umol_m2_s"].sum("band").to_numpy()
+    disc = {"n_disc": N_DISC, "sun_diameter_deg": sun_diameter_deg, "aperture_m": aperture_m}
+    disc["seed"] = seed
     tracers = [rays_to_sky.Tracer(scene, variant) for scene in scenes]
 
     def simulate(shifts: np.ndarray) -> np.ndarray:
@@ -75,9 +81,7 @@ def register(
         moved = np.repeat(points_m[None], len(shifts), axis=0)
         moved[:, :, :2] -= shifts[:, None, :]
         moved = moved.reshape(-1, 3)
-        sunlit = np.mean(
-            [t.sun_visibility(moved, sun, n_disc=N_DISC, seed=seed) for t in tracers], axis=0
-        )
+        sunlit = np.mean([t.sun_visibility(moved, sun, **disc) for t in tracers], axis=0)
         open_sky = np.mean([t.sky_visibility(moved, n=N_SKY, seed=seed) for t in tracers], axis=0)
         par = sunlit * beam + open_sky[:, None] * diffuse
         return par.reshape(len(shifts), len(points_m), len(fine))

@@ -27,7 +27,6 @@ def build(
     optics: Optics,
     *,
     variant: str = "llvm_ad_rgb",
-    sun_diameter_deg: float = 0.53,
     sky_step_deg: float = 1.0,
     ground_radius_m: float = 1000.0,
 ) -> RenderScene:
@@ -40,8 +39,6 @@ def build(
         One to three bands (`group_bands` gathers more).
     variant : str
         An rgb variant of Mitsuba.
-    sun_diameter_deg : float
-        Angular diameter of the sun's disc; 0.53 on average over a year [deg].
     sky_step_deg : float
         Resolution of the sky map; divides 90.
     ground_radius_m : float
@@ -94,7 +91,6 @@ def build(
         n_bands=len(optics),
         ground_z_m=scene.ground_z_m,
         variant=variant,
-        sun_radius_rad=np.radians(0.5 * sun_diameter_deg),
         sky_shape=shape,
         medium=inside[0] if inside else None,
         medium_box_m=box,

@@ -33,8 +33,6 @@ class RenderScene:
     ground_z_m : float
     variant : str
         Of Mitsuba.
-    sun_radius_rad : float
-        Half the angular diameter of the sun's disc.
     sky_shape : (rows, columns)
         Of the sky map.
     medium : mitsuba.Medium or None
@@ -49,7 +47,6 @@ class RenderScene:
     n_bands: int
     ground_z_m: float
     variant: str
-    sun_radius_rad: float
     sky_shape: tuple[int, int]
     medium: Any = None
     medium_box_m: np.ndarray | None = None

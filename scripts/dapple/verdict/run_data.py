@@ -12,8 +12,6 @@ from dapple.formats.shots import Shots
 from dapple.light.moved_sensors import moved_light
 from dapple.scene.traced import TracedScene
 
-SHIFT_M = 0.1
-"""How far sensors are moved to see how much their light depends on where they stand."""
 N_TIMES = 24
 """Times at which light is looked at."""
 
@@ -35,7 +33,7 @@ class RunData:
     voxels : dict of str to Dataset
         By reconstruction, as in `voxels_0.2`.
     light, moved_light : dict of str to Dataset
-        Light at the sensors by reconstruction, and the same with sensors moved by `SHIFT_M`.
+        Light at the sensors by reconstruction, and the same with sensors moved aside.
     sensors_m : (s, 3) float64 or None
         Positions of the sensors, local frame [m].
     sun_zenith_deg, sun_azimuth_deg : (t,) float64 or None
@@ -102,7 +100,6 @@ def with_light(
                 sensors_m,
                 one,
                 sky,
-                shift_m=SHIFT_M,
                 seed=seed,
                 sun_diameter_deg=sun_diameter_deg,
                 aperture_m=aperture_m,

@@ -118,7 +118,7 @@ def build(mesh: Mesh, materials: Materials, *, variant: str = "llvm_ad_rgb") -> 
         "world": triangles(mi, "world", mesh, bsdf),
     }
     low, high = mesh.vertices_m[:, 2].min(), mesh.vertices_m[:, 2].max()
-    render = RenderScene(mi, mi.load_dict(content), 3, float(low), variant, 0.0, shape)
+    render = RenderScene(mi, mi.load_dict(content), 3, float(low), variant, shape)
     return PaintedScene(render, bsdf, materials, float(high))
 
 
