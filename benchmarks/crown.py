@@ -104,10 +104,11 @@ def sky(n_times: int = 306, n_bands: int = 61) -> xr.Dataset:
             "sun_azimuth_deg": ("time", azimuth),
             "beam_normal_umol_m2_s": (("time", "band"), beam[:, None] * per_band, units),
             "diffuse_horizontal_umol_m2_s": (("time", "band"), diffuse[:, None] * per_band, units),
-            "perez": (
+            "sky_coefficients": (
                 ("time", "coefficient"),
                 np.tile([-1.0, -0.3, 10.0, -3.0, 0.45], (n_times, 1)),
             ),
         },
         coords={"time": time_coordinate(times)},
+        attrs={"sky_model": "perez"},
     )

@@ -55,7 +55,7 @@ def main() -> None:
     def sky_at(times):
         path = data / settings.radiation.path
         radiation = broadband(times, site, path=path, **columns)
-        return sky_dataset(times, site, radiation.values)
+        return sky_dataset(times, site, radiation.values, model="perez")
 
     print("max_distance_m  thin_wood_m2  r_fit  east_m  north_m  clock_s", flush=True)
     rows = []

@@ -133,6 +133,12 @@ def data_files(path):
     return [local(str(file)) for file in found]
 
 
+def sky_table():
+    """The measured sky, where one is configured."""
+    radiation = settings.radiation
+    return [data(radiation.sky_table)] if radiation.sky == "measured" else []
+
+
 def optics():
     """Spectra as the configuration has them, tables as files."""
     spectra = settings.optics.model_dump()

@@ -18,6 +18,7 @@ if settings.registration.fit:
                 if settings.radiation.kind == "table"
                 else []
             ),
+            sky_table=sky_table(),
             code=code("registration"),
         output:
             registration=results("registration/registration.json"),

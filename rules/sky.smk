@@ -15,6 +15,7 @@ rule sky:
         radiation=(
             data(settings.radiation.path) if settings.radiation.kind == "table" else []
         ),
+        sky_table=sky_table(),
         registration=FITTED,
         code=code("sky"),
     output:

@@ -5,6 +5,7 @@ import numpy as np
 from dapple.formats import json
 from dapple.registration import shading
 from dapple.scene import scene_files, sensors
+from dapple.sky import measured_sky
 from dapple.sky.radiation_series import broadband
 from dapple.sky.sky_radiance import sky_dataset
 from dapple.sky.sun import Site
@@ -15,10 +16,12 @@ from dapple.workflow import run
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
     site = Site(**params.site)
+    skies = [measured_sky.read(path) for path in inputs.sky_table]
 
     def sky_at(times):
         radiation = broadband(times, site, path=inputs.radiation or None, **params.radiation)
-        return sky_dataset(times, site, radiation.values, **params.atmosphere)
+        measured = [sky.at(times) for sky in skies]
+        return sky_dataset(times, site, radiation.values, *measured, **params.atmosphere)
 
     table = sensors.read(inputs.sensors, params.origin_m, **params.sensors)
     found = shading.register(

@@ -4,6 +4,7 @@ import pandas as pd
 
 from dapple import findings
 from dapple.formats import json, netcdf
+from dapple.sky import measured_sky
 from dapple.sky.radiation_series import broadband
 from dapple.sky.sky_radiance import sky_dataset
 from dapple.sky.sun import Site
@@ -20,7 +21,8 @@ def main(snakemake):
     times = time_range(**params.time) - pd.Timedelta(seconds=ahead_s)
     radiation = broadband(times, site, path=snakemake.input.radiation or None, **params.radiation)
     findings.say(radiation.findings)
-    sky = sky_dataset(times, site, radiation.values, **params.atmosphere)
+    measured = [measured_sky.read(path).at(times) for path in snakemake.input.sky_table]
+    sky = sky_dataset(times, site, radiation.values, *measured, **params.atmosphere)
     netcdf.write(snakemake.output.sky, sky)
     facts = radiation.facts | {"findings": findings.rows(radiation.findings)}
     json.write(snakemake.output.radiation, facts)

@@ -60,6 +60,9 @@ def files_of(script: Path, unused: Sequence[str] = ()) -> set[Path]:
 def _mentioned(path: Path, name: str | None) -> Iterator[tuple[Path, str | None]]:
     """What a name of a module mentions, by file and name."""
     source = _read(path)
+    if path.name == "__init__.py":
+        # A package with code of its own finds its modules by itself: all of them count.
+        yield from ((module, WHOLE) for module in path.parent.glob("[a-z]*.py"))
     if name in source.imports:
         yield source.imports[name]
         return
@@ -173,5 +176,10 @@ def _imported(node: ast.Import | ast.ImportFrom) -> dict[str, tuple[Path, str | 
 
 
 def _file(module: str) -> Path | None:
-    path = SCRIPTS / f"{module.replace('.', '/')}.py"
-    return path if module.startswith("dapple") and path.is_file() else None
+    if module.split(".")[0] != "dapple":
+        return None
+    path = SCRIPTS / module.replace(".", "/")
+    package = path / "__init__.py"
+    if package.is_file() and package.stat().st_size:
+        return package
+    return path.with_suffix(".py") if path.with_suffix(".py").is_file() else None

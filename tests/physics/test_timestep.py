@@ -1,7 +1,5 @@
 """Mitsuba's path tracers at sensors against closed forms: open sky, shade, furnaces, slabs."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -15,13 +13,12 @@ from dapple.scene import mitsuba_scene, render_scene
 from dapple.scene.phase import phase_function
 from dapple.scene.scene_optics import Optics, group_bands, group_flux
 from dapple.scene.surfaces import Scene, Surface, of_kinds
-from dapple.sky.sky_radiance import diffuse_normalisation, relative_radiance
+from dapple.sky.conditions import Ways
+from dapple.sky.models import perez
 from dapple.sky.solar_disc import SUN_DIAMETER_DEG
 
 BEAM, DIFFUSE = np.array([500.0, 600.0, 700.0]), np.array([90.0, 80.0, 70.0])
-CLEAR = np.array([-1.0, -0.3, 10.0, -3.0, 0.45])
 ORIGIN = np.zeros((1, 3))
-ISOTROPIC = np.zeros(5)
 
 
 def effort(**more):
@@ -34,8 +31,18 @@ def optics(rho=0.0, tau=0.0, bark=0.0, ground=0.0, n=3):
     return Optics.of_tree(np.linspace(450.0, 650.0, n), *values)
 
 
+def even(zenith_deg, azimuth_deg):
+    return np.ones_like(zenith_deg)
+
+
+def clear(zenith_deg, azimuth_deg):
+    """Bright around a sun at 50° in azimuth 110°."""
+    ways = Ways.under(50.0, 110.0, zenith_deg, azimuth_deg)
+    return perez.radiance(np.array([-1.0, -0.3, 10.0, -3.0, 0.45]), ways)
+
+
 def light(scene, sensors=ORIGIN, *, zenith=30.0, azimuth=0.0, beam=BEAM, diffuse=DIFFUSE, **more):
-    options = {"sky": ISOTROPIC, "effort": effort(), "seed": 1}
+    options = {"sky": even, "effort": effort(), "seed": 1}
     options |= {"sun_diameter_deg": SUN_DIAMETER_DEG, **more}
     return timestep(
         scene,
@@ -114,15 +121,16 @@ def test_the_open_sky_gives_beam_and_diffuse_light():
 
 def test_an_uneven_sky_gives_the_same_diffuse_light_on_the_level():
     scene = mitsuba_scene.build(Scene(), optics())
-    found = light(scene, zenith=50.0, azimuth=110.0, sky=CLEAR, effort=effort(sky=4096))
+    found = light(scene, zenith=50.0, azimuth=110.0, sky=clear, effort=effort(sky=4096))
     assert found["sky"][0] == pytest.approx(DIFFUSE, rel=2e-3)
 
 
 def test_the_sky_map_carries_the_irradiance_of_the_radiance_function():
-    radiance = partial(relative_radiance, CLEAR, 50.0, 110.0)
-    sky = render_scene.sky_map(radiance, (181, 360))
-    ratio = sky[30, 100] / radiance(30.0, 100.5)
-    assert ratio == pytest.approx(1.0 / diffuse_normalisation(CLEAR, 50.0), rel=2e-3)
+    sky = render_scene.sky_map(clear, (181, 360))
+    sine = np.sqrt((np.arange(1000) + 0.5) / 1000)  # even in cosine-weighted solid angle
+    zenith, azimuth = np.degrees(np.arcsin(sine)), 0.36 * (np.arange(1000) + 0.5)
+    irradiance = np.pi * clear(zenith[:, None], azimuth).mean()
+    assert sky[30, 100] / clear(30.0, 100.5) == pytest.approx(1.0 / irradiance, rel=2e-3)
 
 
 @pytest.mark.parametrize("azimuth", [0.0, 90.0, 180.0, 270.0])

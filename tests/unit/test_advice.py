@@ -38,10 +38,14 @@ def sky_at(minutes):
             "sun_azimuth_deg": ("time", 150 + np.asarray(minutes) * 0.5),
             "beam_normal_umol_m2_s": (("time", "band"), np.full((n, 7), 200.0), units),
             "diffuse_horizontal_umol_m2_s": (("time", "band"), np.full((n, 7), 40.0), units),
-            "perez": (("time", "coefficient"), np.tile([-1.0, -0.3, 10.0, -3.0, 0.45], (n, 1))),
+            "sky_coefficients": (
+                ("time", "coefficient"),
+                np.tile([-1.0, -0.3, 10.0, -3.0, 0.45], (n, 1)),
+            ),
         },
         coords={"time": time_coordinate(pd.DatetimeIndex(stamps))},
-        attrs={"latitude_deg": 48.0, "longitude_deg": 7.8, "altitude_m": 230.0},
+        attrs={"latitude_deg": 48.0, "longitude_deg": 7.8, "altitude_m": 230.0}
+        | {"sky_model": "perez"},
     )
 
 
@@ -105,7 +109,8 @@ def test_a_full_model_keeps_sky_and_spectra_as_they_are():
     plain, black = light_model.simplified(
         sky, OPTICS, Model(bands=7, sky="isotropic", ground="black")
     )
-    assert not plain["perez"].any()
+    assert plain.attrs["sky_model"] == "isotropic"
+    assert "sky_coefficients" not in plain
     assert not black.reflectance["ground"].any()
 
 
@@ -167,7 +172,7 @@ EFFECTS = [
     Effect("sky_patches", 145, 0.004, 0.0, 0.0, parts(10.0, 10.0, 1.0)),
     Effect("sky_patches", 2305, 0.0, 0.0, 0.0, FULL),
     Effect("sky", "isotropic", 0.001, 0.0, 0.0, parts(5.0, 10.0, 0.5)),
-    Effect("sky", "perez", 0.0, 0.0, 0.0, FULL),
+    Effect("sky", "as given", 0.0, 0.0, 0.0, FULL),
     Effect("max_orders", 1, 0.013, 0.0, 0.0, parts(10.0, 5.0, 1.0)),
     Effect("max_orders", 2, 0.003, 0.0, 0.0, parts(10.0, 10.0, 1.0)),
     Effect("max_orders", 12, 0.0, 0.0, 0.0, FULL),
@@ -192,7 +197,7 @@ def test_the_cheapest_model_whose_effects_add_up_to_the_tolerance_is_chosen():
 
 
 def test_what_saves_nothing_is_never_left_out_whatever_the_clock_says():
-    assert chosen(1.0).model.sky == "perez"
+    assert chosen(1.0).model.sky == "as given"
 
 
 def test_the_series_own_times_are_no_approximation_and_no_finer_ones_are_traced():

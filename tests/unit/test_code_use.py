@@ -96,3 +96,14 @@ def test_what_is_turned_off_is_not_followed(reached, tmp_path):
 def test_a_parameter_is_not_the_neighbour_of_its_name(reached):
     text = "from dapple import first\ndef a(b, *, c=0):\n    return b.x, c\ndef b(): first.f()\n"
     assert reached("from dapple.some import a\na(1)", some=text, **LEAVES) == {"some"}
+
+
+def test_all_modules_of_a_package_with_code_of_its_own_count(tmp_path, monkeypatch):
+    monkeypatch.setattr(code_use, "SCRIPTS", tmp_path)
+    package = tmp_path / "dapple/kinds"
+    package.mkdir(parents=True)
+    (package / "__init__.py").write_text("def find(name): return __import__(name)\n")
+    (package / "one.py").write_text("def f(): pass\n")
+    (tmp_path / "rule.py").write_text("from dapple import kinds\nkinds.find('one')\n")
+    found = code_use.files_of(tmp_path / "rule.py")
+    assert found == {package / "__init__.py", package / "one.py"}

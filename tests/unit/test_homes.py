@@ -1,6 +1,8 @@
 """Every default has one home: what the configuration says, no function says again."""
 
 import ast
+import subprocess
+import sys
 from collections import defaultdict
 from pathlib import Path
 
@@ -58,6 +60,16 @@ def test_no_function_has_a_default_that_the_configuration_has_too(house):
         if any(value == other for other in configured.get(name, {}).values())
     ]
     assert twice == []
+
+
+def test_the_configuration_is_read_without_numpy():
+    """Snakemake reads it in an environment of its own, where defaults still have their homes."""
+    code = "import sys; sys.modules['numpy'] = None; import dapple.config.settings as s; "
+    code += "print(s.Settings(experiment='x').radiation.sky)"
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=DAPPLE.parent, capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "perez\n"
 
 
 @pytest.mark.parametrize("surface", ["BARK", "MEADOW", "CONIFER_BARK", "LITTER"])

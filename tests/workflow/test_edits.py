@@ -72,6 +72,7 @@ CODE = {
     "structure/voxels.py": f"voxels*2 voxels_summary*2 {traced(2)}",
     "structure/occlusion.py": "verdict",  # the correction is turned off
     "sky/sun.py": f"sky {SKY}",
+    "sky/models/perez.py": f"sky {SKY}",
     "scene/sensors.py": f"sensors tree_figure {traced(4)}",
     "light/paths.py": f"transport*4 light*4 agreement {COMPARED}",
     "light/series.py": f"light*4 agreement {COMPARED}",

@@ -22,7 +22,7 @@ from dapple.sky.sun import position
 LEVELS = {
     "sun": ("point", "disc"),
     "sky_patches": (1, 145, 577, 2305),
-    "sky": ("isotropic", "perez"),
+    "sky": ("isotropic", "as given"),
     "max_orders": (0, 1, 2),
     "ground": ("black", "lambertian"),
     "bands": (1, 3),

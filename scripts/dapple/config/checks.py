@@ -72,6 +72,9 @@ def paths(settings: Settings, where: str) -> None:
     for name in ("radiation", "sensors", "measured"):
         section = getattr(settings, name)
         needed[f"{name}.kind: table"] = (f"{name}.path", section.kind == "table", section.path)
+    radiation = settings.radiation
+    is_measured = radiation.sky == "measured"
+    needed["radiation.sky: measured"] = ("radiation.sky_table", is_measured, radiation.sky_table)
     for reason, (key, is_read, path) in needed.items():
         if is_read and not path:
             raise InputError(
@@ -334,7 +337,14 @@ def chlorophyll(settings: Settings, where: str) -> None:
 
 
 def stability(settings: Settings, where: str) -> None:
-    """What is to be made worse, and what is to be rebuilt, is known."""
+    """What is to be made worse and rebuilt is known; the sky is one that other suns have too."""
+    if settings.study == "stability" and settings.radiation.sky == "measured":
+        raise InputError(
+            where,
+            "`study: stability` and `radiation.sky: measured`",
+            "a sky model that follows the sun and the radiation",
+            "Set radiation.sky to perez.",
+        )
     for name in settings.stability.stressors:
         stressors.find(name, where)
     wanted, key = settings.stability.reconstructions, f"{where}, `stability.reconstructions`"

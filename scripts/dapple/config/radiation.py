@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from annotated_types import Ge, Gt, Le
 
 from dapple.config.base import Positive, Share, TimedTable, key
+from dapple.sky import models
 
+if TYPE_CHECKING:
+    SkyModel = str
+else:
+    SkyModel = Literal[models.NAMES]
+"""Which models there are is said by the files of `dapple.sky.models`."""
 ATMOSPHERE = {
     "precipitable_water_cm",
     "ozone_atm_cm",
@@ -43,13 +49,14 @@ class Radiation(TimedTable):
     ozone_atm_cm: Annotated[float, Gt(0), Le(0.6)] = key(0.31, "ozone, for the spectrum")
     aerosol_optical_depth_500nm: Annotated[float, Ge(0), Le(2)] = key(0.1, "haze, for the spectrum")
     ground_albedo: Share = key(0.2, "broadband, for the spectrum of the diffuse light")
-    sky: Literal["perez", "isotropic"] = key(
-        "perez", "angular distribution of diffuse light", "Perez et al. 1993"
+    sky: SkyModel = key("perez", "how diffuse light is spread over the sky", "Perez et al. 1993")
+    sky_table: str = key(
+        "", "sky: measured: CSV of zenith_deg, azimuth_deg, radiance and, if it changes, time_utc"
     )
 
     def broadband(self) -> dict[str, Any]:
         """Options of `sky.radiation_series.broadband`, without the path."""
-        return self.model_dump(exclude={"path", "sky", *ATMOSPHERE})
+        return self.model_dump(exclude={"path", "sky", "sky_table", *ATMOSPHERE})
 
     def atmosphere(self) -> dict[str, Any]:
         """Options of `sky.sky_radiance.sky_dataset`."""

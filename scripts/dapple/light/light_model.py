@@ -10,6 +10,7 @@ from dapple.light.tolerances import DIRECT_SHARE, PATH_SHARE
 from dapple.light.visibility import Sunlit
 from dapple.scene.scene_optics import Optics, group_bands, group_flux
 from dapple.scene.surfaces import GROUND
+from dapple.sky.sky_radiance import isotropic
 
 FLUXES = ("beam_normal_umol_m2_s", "diffuse_horizontal_umol_m2_s")
 
@@ -23,8 +24,8 @@ class Model:
     sun : {"disc", "point"}
     sky_patches : int
         Subdivision of the sky.
-    sky : {"perez", "isotropic"}
-        Whether the sky keeps the anisotropy that its dataset has.
+    sky : {"as given", "isotropic"}
+        Whether light keeps the distribution over the sky that its dataset has.
     max_orders : int
         Most surfaces on a path of light.
     ground : {"lambertian", "black"}
@@ -37,7 +38,7 @@ class Model:
 
     sun: str = "disc"
     sky_patches: int = 2305
-    sky: str = "perez"
+    sky: str = "as given"
     max_orders: int = 255
     ground: str = "lambertian"
     bands: int = 61
@@ -111,7 +112,7 @@ def simplified(sky: xr.Dataset, optics: Optics, model: Model) -> tuple[xr.Datase
         In fewer bands where the model groups them; the photon flux of all is the same.
     """
     if model.sky == "isotropic":
-        sky = sky.assign(perez=xr.zeros_like(sky["perez"]))
+        sky = isotropic(sky)
     if model.ground == "black":
         optics = optics.with_black(GROUND)
     if model.bands < len(optics):

@@ -93,12 +93,7 @@ def _from_sky(
     subdivision = patches(transport.n_patches)
     beam = sky["beam_normal_umol_m2_s"].transpose("time", "band").to_numpy()
     diffuse = sky["diffuse_horizontal_umol_m2_s"].transpose("time", "band").to_numpy()
-    radiance = patch_radiance(
-        sky["perez"].to_numpy(),
-        sky["sun_zenith_deg"].to_numpy(),
-        sky["sun_azimuth_deg"].to_numpy(),
-        subdivision,
-    )
+    radiance = patch_radiance(sky, subdivision)
     spread = sun_radiance(towards_sun(sky), subdivision, kernel_deg=sun_kernel_deg)
     from_sky = straight(transport, radiance) * diffuse.sum(axis=1)
     both = np.concatenate([radiance, spread]), np.concatenate([diffuse, beam])

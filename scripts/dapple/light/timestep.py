@@ -13,7 +13,6 @@ asked along rays that start at the sensor:
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -22,7 +21,6 @@ from dapple.errors import InputError
 from dapple.frames import direction_from_angles
 from dapple.scene import patterns
 from dapple.scene.render_scene import RenderScene
-from dapple.sky.sky_radiance import relative_radiance
 from dapple.streams import stream_seed
 
 POINT_SINE = 1e-4
@@ -72,7 +70,7 @@ def timestep(
     sun_azimuth_deg: float,
     beam_normal: np.ndarray,
     diffuse_horizontal: np.ndarray,
-    sky: np.ndarray | Callable[[np.ndarray, np.ndarray], np.ndarray],
+    sky: Callable[[np.ndarray, np.ndarray], np.ndarray],
     sun_diameter_deg: float,
     effort: Effort,
     seed: int,
@@ -92,9 +90,8 @@ def timestep(
         Irradiance of the sun on a plane that faces it, per band.
     diffuse_horizontal : (b,) array
         Irradiance of the open sky on the level, per band, in the same unit.
-    sky : (5,) array or callable
-        Coefficients of Perez et al. (1993) (`sky_radiance.relative_radiance`; zeros: isotropic), or
-        relative radiance as a function of zenith and azimuth [deg].
+    sky : callable
+        Relative radiance as a function of zenith and azimuth [deg].
     sun_diameter_deg : float
         Angular diameter of the sun's disc; 0 is a point [deg].
     effort : Effort
@@ -128,7 +125,7 @@ def timestep(
             scene.set_even_sky(beam / (np.pi * sine**2))
             parts["direct"] = _direct(scene, sensors, towards_sun, sine, effort, aperture_m, seed)
         scene.set_sun(towards_sun, beam)
-        scene.set_sky(_radiance_function(sky, sun_zenith_deg, sun_azimuth_deg), diffuse)
+        scene.set_sky(sky, diffuse)
         for part in ("sky", "scattered") if diffuse.any() else ("scattered",):
             parts[part] = _hemisphere(scene, sensors, part, effort, aperture_m, seed)
     return _summary(parts, scene.n_bands)
@@ -146,12 +143,6 @@ def _checked(sensors: np.ndarray, ground_z_m: float) -> np.ndarray:
     lifted = sensors.copy()
     lifted[:, 2] = np.maximum(lifted[:, 2], ground_z_m + LIFT_M)
     return lifted
-
-
-def _radiance_function(sky, sun_zenith_deg: float, sun_azimuth_deg: float) -> Callable:
-    if callable(sky):
-        return sky
-    return partial(relative_radiance, np.asarray(sky), sun_zenith_deg, sun_azimuth_deg)
 
 
 def _direct(

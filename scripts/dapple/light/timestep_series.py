@@ -1,6 +1,6 @@
 """The per-timestep engine over a whole day."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +14,7 @@ from dapple.scene import mitsuba_scene
 from dapple.scene.render_scene import RenderScene
 from dapple.scene.scene_optics import Optics, group_bands, group_flux
 from dapple.scene.surfaces import Scene
+from dapple.sky.sky_radiance import in_directions
 from dapple.streams import stream_seed
 
 
@@ -70,6 +71,11 @@ class Reference:
             mitsuba_scene.build(scene, self.optics, variant=self.variant) for scene in self.scenes
         ]
 
+    def _radiance(self, index: int) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+        """Relative radiance of the sky at one time, of zenith and azimuth."""
+        at_time = self.sky.isel(time=[index])
+        return lambda zenith_deg, azimuth_deg: in_directions(at_time, zenith_deg, azimuth_deg)[0]
+
     def at(self, index: int, sensors: pd.DataFrame) -> xr.Dataset:
         """Light of one time as a dataset with a single time."""
         sensors_m = sensors[["x_m", "y_m", "z_m"]].to_numpy()
@@ -81,7 +87,7 @@ class Reference:
                 sun_azimuth_deg=float(self.sky["sun_azimuth_deg"][index]),
                 beam_normal=group_flux(self.beam[index], self.group, self.n_bands),
                 diffuse_horizontal=group_flux(self.diffuse[index], self.group, self.n_bands),
-                sky=self.sky["perez"][index].to_numpy(),
+                sky=self._radiance(index),
                 sun_diameter_deg=self.sun_diameter_deg,
                 effort=self.effort,
                 aperture_m=self.aperture_m,
