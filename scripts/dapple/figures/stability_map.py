@@ -126,13 +126,15 @@ def curves(points: pd.DataFrame) -> Figure:
     for ax, name in zip(grid.ravel(), names, strict=False):
         runs = points[points["stressor"] == name]
         levels = runs.groupby("level")[["label", "harmless"]].first()
-        for name in panels:
-            by = runs[runs["reconstruction"] == name].groupby("level")["r"]
+        for reconstruction in panels:
+            by = runs[runs["reconstruction"] == reconstruction].groupby("level")["r"]
             over = by.agg(["median", "min", "max"]).reindex(levels.index)
-            colour = style.colour(name, PANELS)
+            colour = style.colour(reconstruction, PANELS)
             at = np.arange(len(over))
             ax.fill_between(at, over["min"], over["max"], color=colour, alpha=0.2, lw=0)
-            ax.plot(at, over["median"], "o-", ms=2.5, color=colour, label=style.label(name))
+            ax.plot(
+                at, over["median"], "o-", ms=2.5, color=colour, label=style.label(reconstruction)
+            )
         harmless = int(np.argmax(levels["harmless"].astype(bool)))
         ax.axvline(harmless, color="#BBBBBB", lw=3, zorder=0)
         ax.set_title(STRESSORS[name].title, fontsize=8)
