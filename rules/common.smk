@@ -53,7 +53,7 @@ REFERENCE = settings.light.timestep.model_dump(
     exclude={"step_min", "times_per_job"}
 ) | {
     "sun_diameter_deg": settings.light.sun_diameter_deg,
-    "aperture_m": settings.light.aperture_m,
+    "aperture_m": settings.light.entrance_m,
     "variant": f"{VARIANT}_rgb",
 }
 OF_BEAM = {"sun_diameter_deg", "aperture_m"}

@@ -37,7 +37,7 @@ if settings.registration.fit:
             sensors=settings.sensors.table(),
             records=settings.measured.table(),
             sun_diameter_deg=settings.light.sun_diameter_deg,
-            aperture_m=settings.light.aperture_m,
+            aperture_m=settings.light.entrance_m,
             variant=f"{VARIANT}_rgb",
             seed=stream("registration"),
         message:

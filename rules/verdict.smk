@@ -53,7 +53,7 @@ rule verdict:
         ground_z_m=settings.ground_z_m,
         variant=f"{VARIANT}_mono",
         sun_diameter_deg=settings.light.sun_diameter_deg,
-        aperture_m=settings.light.aperture_m,
+        aperture_m=settings.light.entrance_m,
         seed=stream("verdict"),
     message:
         said("how far the run can be trusted")

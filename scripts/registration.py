@@ -35,6 +35,7 @@ def main(snakemake):
         fit_share=params.fit_share,
         sun_diameter_deg=params.sun_diameter_deg,
         aperture_m=params.aperture_m,
+        gain=params.gain,
         variant=params.variant,
         seed=params.seed,
     )

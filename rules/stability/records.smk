@@ -39,7 +39,7 @@ if WORSENED:
             ground_z_m=settings.ground_z_m,
             variant=f"{VARIANT}_mono",
             sun_diameter_deg=settings.light.sun_diameter_deg,
-            aperture_m=settings.light.aperture_m,
+            aperture_m=settings.light.entrance_m,
             seed=stream("stability_records"),
         message:
             said("its own records made worse")

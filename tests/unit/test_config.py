@@ -5,6 +5,7 @@ import json
 from datetime import UTC, datetime
 
 import jsonschema
+import numpy as np
 import pytest
 import yaml
 
@@ -156,7 +157,10 @@ CONTRADICTIONS = {
         ),
     ],
     "measured": [(REAL_CLOUD | {"measured": {"kind": "virtual"}}, "measured.kind: virtual")],
-    "registration": [({"registration": {"fit": True}}, "sensors.kind: grid")],
+    "registration": [
+        ({"registration": {"fit": True}}, "sensors.kind: grid"),
+        ({"registration": {"gain": "site"}}, "registration.fit: false"),
+    ],
     "times": [
         ({"time": {"end": "2023-08-10 09:00"}}, "09:00"),
         (
@@ -301,3 +305,12 @@ def test_a_time_with_seconds_means_what_it_says_though_yaml_reads_it_otherwise()
     time = validate(yaml.safe_load(text)).time
     assert time.start == "2023-08-10 10:10:00"
     assert datetime.fromisoformat(time.end) == datetime(2023, 8, 10, 16, 50, tzinfo=UTC)
+
+
+def test_leaves_that_sway_widen_the_entrance_of_a_sensor():
+    """An even disc has a quarter of its diameter for a standard deviation along each axis."""
+    rng = np.random.default_rng(1)
+    radius, angle = np.sqrt(rng.random(100_000)), 2 * np.pi * rng.random(100_000)
+    disc = validate({"light": {"sway_m": 0.1}}).light.entrance_m / 2
+    assert np.std(disc * radius * np.cos(angle)) == pytest.approx(0.1, rel=0.01)
+    assert validate({"light": {"sway_m": 0.3, "aperture_m": 0.5}}).light.entrance_m == 1.3

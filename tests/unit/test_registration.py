@@ -6,6 +6,7 @@ import pytest
 
 from dapple.errors import InputError
 from dapple.registration.fit import register, split
+from dapple.registration.shading import open_sky_gain
 
 SENSORS_M = np.random.default_rng(7).uniform(-3, 3, (20, 2))
 BRANCHES = np.random.default_rng(8).uniform(-5, 5, (40, 3)) * [1, 1, 0.25] + [0, 0, 3.5]
@@ -128,3 +129,22 @@ def test_times_are_split_into_before_and_after():
 def test_a_split_that_leaves_nothing_to_report_or_to_fit_is_an_error(share):
     with pytest.raises(InputError, match="leaves one part empty"):
         split(["1_1", "1_2"], pd.date_range("2023-08-10", periods=4, tz="UTC"), share=share)
+
+
+def test_the_gain_is_that_of_sensors_in_full_sun():
+    """Shade that the simulation does not know, half-shade and other sensors have no say."""
+    rng = np.random.default_rng(3)
+    simulated = rng.uniform(1000, 1500, (4, 100))
+    measured = 0.95 * simulated * rng.normal(1, 0.01, simulated.shape)
+    measured[0, :40] = 200.0
+    measured[1] = np.nan
+    sunlit = np.ones_like(simulated)
+    sunlit[2], measured[2] = 0.5, 2 * simulated[2]
+    found = open_sky_gain(measured, simulated, sunlit)
+    assert found["gain"] == pytest.approx(0.95, abs=0.003)
+    assert found["n_gain"] == 160
+
+
+def test_sensors_that_never_see_the_sun_tell_no_gain():
+    with pytest.raises(InputError, match=r"registration\.gain.*full sun"):
+        open_sky_gain(np.full((2, 50), 100.0), np.full((2, 50), 900.0), np.zeros((2, 50)))

@@ -358,3 +358,13 @@ def test_a_broken_file_or_one_without_a_time_zone_is_refused(tmp_path):
 def test_times_reach_utc_whatever_their_zone():
     berlin = pd.date_range("2023-08-10 12:00", periods=2, freq="h", tz="Europe/Berlin")
     assert list(utc(berlin).hour) == [10, 11]
+
+
+def test_a_gain_makes_sun_and_sky_brighter_and_leaves_the_rest_alone():
+    sky = day()
+    brighter = sky_radiance.scaled(sky, 0.95)
+    for name in sky.data_vars:
+        factor = 0.95 if name in sky_radiance.FLUXES else 1.0
+        np.testing.assert_allclose(brighter[name], factor * sky[name], rtol=1e-12)
+        assert brighter[name].attrs == sky[name].attrs
+    assert brighter.attrs["gain"] == 0.95

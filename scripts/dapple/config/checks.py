@@ -140,8 +140,15 @@ def measured(settings: Settings, where: str) -> None:
 
 
 def registration(settings: Settings, where: str) -> None:
-    """A fit needs surveyed sensors and their records."""
+    """A fit needs surveyed sensors and their records; a gain is fitted."""
     if not settings.registration.fit:
+        if settings.registration.gain != "none":
+            raise InputError(
+                where,
+                f"`registration.gain: {settings.registration.gain}` and `registration.fit: false`",
+                "`gain: none`, or `fit: true`",
+                "A gain is fitted on the records of the fitting sensors.",
+            )
         return
     for key, kind in (("sensors", settings.sensors.kind), ("measured", settings.measured.kind)):
         if kind != "table":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
 from annotated_types import Ge, Gt, Le
@@ -55,5 +56,17 @@ class Light(Section):
         SUN_DIAMETER_DEG, "angular diameter of the solar disc; 0: a point"
     )
     aperture_m: NotNegative = key(0.0, "diameter of the sensors' receiving discs; 0: points")
+    sway_m: NotNegative = key(
+        0.0, "standard deviation, east and north, by which leaves move within a record"
+    )
     transport: Transport = Transport()
     timestep: Timestep = Timestep()
+
+    @property
+    def entrance_m(self) -> float:
+        """Diameter of the disc over which light is averaged [m].
+
+        A tree that sways above a sensor is a sensor that moves below the tree. An even disc four
+        standard deviations wide has this standard deviation along each axis.
+        """
+        return math.hypot(self.aperture_m, 4 * self.sway_m)

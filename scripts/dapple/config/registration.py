@@ -13,7 +13,13 @@ class Registration(Section):
     fit: bool = key(False, "fit them on a part of the records and report on the rest")
     origin_m: tuple[float, float, float] = key((0.0, 0.0, 0.0), "origin, or first guess of it")
     max_shift_m: NotNegative = key(0.4, "largest shift that is tried, east and north")
-    max_clock_offset_s: NotNegative = key(60.0, "largest clock offset that is tried")
+    max_clock_offset_s: NotNegative = key(
+        60.0,
+        "largest clock offset that is tried; a wrong shift can stand in for one",
+    )
+    gain: Literal["none", "site"] = key(
+        "none", "factor on sun and sky, fitted to fitting sensors while they see the whole sun"
+    )
     split: Literal["sensor", "time"] = key(
         "sensor", "what is divided into fitting and reporting parts"
     )

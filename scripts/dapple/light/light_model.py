@@ -10,9 +10,7 @@ from dapple.light.tolerances import DIRECT_SHARE, PATH_SHARE
 from dapple.light.visibility import Sunlit
 from dapple.scene.scene_optics import Optics, group_bands, group_flux
 from dapple.scene.surfaces import GROUND
-from dapple.sky.sky_radiance import isotropic
-
-FLUXES = ("beam_normal_umol_m2_s", "diffuse_horizontal_umol_m2_s")
+from dapple.sky.sky_radiance import FLUXES, isotropic
 
 
 @dataclass(frozen=True)

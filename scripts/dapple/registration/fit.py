@@ -224,6 +224,14 @@ def register(
     return _registration(scores, centre, shift_range_m, clock_range_s, int(usable.sum()))
 
 
+def at_times(
+    light: np.ndarray, time_s: np.ndarray, found: Registration, fine_time_s: np.ndarray
+) -> np.ndarray:
+    """Simulated values (sensor, fine time) at the times that loggers showed, (sensor, time)."""
+    true_s = time_s - found.clock_offset_s
+    return np.stack([np.interp(true_s, fine_time_s, one) for one in light])
+
+
 def _check(usable, time_s, fine_time_s, clock_range_s) -> None:
     if usable.sum() < 3:
         raise InputError(

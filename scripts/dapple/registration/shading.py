@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from dapple.errors import InputError
 from dapple.light import rays_to_sky
 from dapple.registration import fit
 from dapple.scene.surfaces import Scene
@@ -30,6 +31,7 @@ def register(
     fit_share: float,
     sun_diameter_deg: float,
     aperture_m: float,
+    gain: str,
     variant: str,
     seed: int,
 ) -> dict:
@@ -52,12 +54,15 @@ def register(
     split_by, fit_share : str, float
         The part of the records that fits; the rest reports.
     sun_diameter_deg, aperture_m : float
-        Angular diameter of the sun [deg], diameter of the sensors' receiving discs [m].
+        Angular diameter of the sun [deg], diameter of the level disc around each sensor over
+        which light is averaged [m].
+    gain : {"none", "site"}
+        Whether to fit `open_sky_gain` on the fitting part.
 
     Returns
     -------
     dict
-        Shift, clock offset, r on the fitting part, and both parts by name.
+        Shift, clock offset, gain, r on the fitting part, and both parts by name.
     """
     table = records.pivot(index="sensor", columns="time", values="par_umol_m2_s")
     parts = fit.split(list(table.index), table.columns, by=split_by, share=fit_share, seed=seed)
@@ -76,22 +81,29 @@ def register(
     disc["seed"] = seed
     tracers = [rays_to_sky.Tracer(scene, variant) for scene in scenes]
 
-    def simulate(shifts: np.ndarray) -> np.ndarray:
-        """Moving the tree east is moving the sensors west."""
+    def seen(shifts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Share of the sun's disc and of the sky. Moving the tree east moves the sensors west."""
         moved = np.repeat(points_m[None], len(shifts), axis=0)
         moved[:, :, :2] -= shifts[:, None, :]
         moved = moved.reshape(-1, 3)
         sunlit = np.mean([t.sun_visibility(moved, sun, **disc) for t in tracers], axis=0)
         open_sky = np.mean([t.sky_visibility(moved, n=N_SKY, seed=seed) for t in tracers], axis=0)
-        par = sunlit * beam + open_sky[:, None] * diffuse
-        return par.reshape(len(shifts), len(points_m), len(fine))
+        shape = len(shifts), len(points_m), -1
+        return sunlit.reshape(shape), open_sky.reshape(shape)
 
-    start = fine[0]
+    def simulate(shifts: np.ndarray) -> np.ndarray:
+        sunlit, open_sky = seen(shifts)
+        return sunlit * beam + open_sky * diffuse
+
+    fine_s, record_s = (
+        (when - fine[0]).total_seconds().to_numpy() for when in (fine, table.columns)
+    )
+    measured = table.to_numpy()[used]
     found = fit.register(
-        table.to_numpy()[used],
-        (table.columns - start).total_seconds().to_numpy(),
+        measured,
+        record_s,
         simulate,
-        (fine - start).total_seconds().to_numpy(),
+        fine_s,
         fitting=parts.fitting[used],
         shift_range_m=max_shift_m,
         shift_step_m=max_shift_m / 4 if max_shift_m else 1.0,
@@ -99,6 +111,15 @@ def register(
     )
     facts = asdict(found)
     facts.pop("candidates")
+    facts["gain"] = 1.0
+    if gain == "site":
+        sunlit, open_sky = (part[0] for part in seen(np.array([[found.east_m, found.north_m]])))
+        par = fit.at_times(sunlit * beam + open_sky * diffuse, record_s, found, fine_s)
+        facts |= open_sky_gain(
+            np.where(parts.fitting[used], measured, np.nan),
+            par,
+            fit.at_times(sunlit, record_s, found, fine_s),
+        )
     return facts | {
         "fitting_part": parts.fitting_part,
         "reporting_part": parts.reporting_part,
@@ -107,3 +128,40 @@ def register(
             str(table.columns[parts.fitting.all(axis=0)][-1]) if split_by == "time" else None
         ),
     }
+
+
+def open_sky_gain(
+    measured: np.ndarray, simulated: np.ndarray, sunlit: np.ndarray, least: int = 30
+) -> dict[str, float | int]:
+    """What sensors read over what the radiation says, while they see the whole sun.
+
+    Parameters
+    ----------
+    measured, simulated : (sensor, time) float64
+        PAR; NaN where there is no record.
+    sunlit : (sensor, time) float64
+        Share of the sun's disc that is seen in the simulation.
+    least : int
+        Fewer records tell no gain.
+
+    Returns
+    -------
+    dict
+        `gain`, the median of the ratios, and `n_gain`, of so many records. A record of less than
+        0.8 of the simulated light counts as shade that the simulation does not know.
+
+    Raises
+    ------
+    InputError
+        Too few records in full sun.
+    """
+    whole = np.isfinite(measured) & (sunlit > 0.98) & (measured > 0.8 * simulated)
+    if whole.sum() < least:
+        raise InputError(
+            "registration.gain",
+            f"{int(whole.sum())} records of fitting sensors in full sun",
+            f"at least {least}",
+            "Set registration.gain to none, or give records of a clear day and of open places.",
+        )
+    ratio = measured[whole] / simulated[whole]
+    return {"gain": float(np.median(ratio)), "n_gain": int(whole.sum())}

@@ -14,6 +14,9 @@ from dapple.sky.spectrum import par_spectrum
 from dapple.sky.sun import Site, direct_normal, extraterrestrial, position
 from dapple.times import utc
 
+FLUXES = ("beam_normal_umol_m2_s", "diffuse_horizontal_umol_m2_s")
+"""Variables of a sky dataset that carry light, in every band."""
+
 
 def in_directions(sky: xr.Dataset, zenith_deg: np.ndarray, azimuth_deg: np.ndarray) -> np.ndarray:
     """Relative radiance of a sky.
@@ -192,3 +195,10 @@ def sky_dataset(
             "altitude_m": site.altitude_m,
         },
     )
+
+
+def scaled(sky: xr.Dataset, gain: float) -> xr.Dataset:
+    """A sky whose sun and sky are brighter by a factor, everything else as it was."""
+    with xr.set_options(keep_attrs=True):
+        fluxes = {name: gain * sky[name] for name in FLUXES}
+    return sky.assign(fluxes).assign_attrs(gain=gain)
