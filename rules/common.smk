@@ -49,16 +49,13 @@ SKY = {
     "radiation": settings.radiation.broadband(),
     "atmosphere": settings.radiation.atmosphere(),
 }
-REFERENCE = settings.light.timestep.model_dump(
-    exclude={"step_min", "times_per_job"}
-) | {
+OF_BEAM = {
     "sun_diameter_deg": settings.light.sun_diameter_deg,
     "aperture_m": settings.light.entrance_m,
-    "variant": f"{VARIANT}_rgb",
 }
-OF_BEAM = {"sun_diameter_deg", "aperture_m"}
-TRACING = settings.light.transport.model_dump()
-TRACING |= settings.light.model_dump(include=OF_BEAM)
+REFERENCE = OF_BEAM | {"variant": f"{VARIANT}_rgb"}
+REFERENCE |= settings.light.timestep.model_dump(exclude={"step_min", "times_per_job"})
+TRACING = settings.light.transport.model_dump() | OF_BEAM
 CHECKED = LIT if settings.light.engine == "transport" and settings.light.check else ()
 ADVISED = settings.light.model == "advised"
 COMPARED = LIT if settings.measured.kind != "none" else ()

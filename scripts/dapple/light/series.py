@@ -6,7 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from dapple.light.tensor import Transport, straight, summed_scattered, sun_radiance
+from dapple.light.tensor import (
+    Transport,
+    scattered_variance,
+    straight,
+    summed_scattered,
+    sun_radiance,
+)
 from dapple.light.visibility import Sunlit
 from dapple.scene.scene_optics import Optics
 from dapple.sky.open_sky import level_beam, towards_sun
@@ -99,7 +105,9 @@ def _from_sky(
     both = np.concatenate([radiance, spread]), np.concatenate([diffuse, beam])
     scattered = summed_scattered(transport, *both, optics)
     scattered = scattered[..., : len(beam)] + scattered[..., len(beam) :]
-    variance = (from_sky + scattered).var(axis=1, ddof=1) / transport.n_replicates
+    # Straight rays and paths are drawn independently: their variances add.
+    variance = from_sky.var(axis=1, ddof=1) / transport.n_replicates
+    variance += scattered_variance(scattered, transport.n_paths)
     return from_sky.mean(axis=1), scattered.mean(axis=1), variance
 
 

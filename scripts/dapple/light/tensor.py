@@ -104,7 +104,7 @@ def nominal_error(transport: Transport, optics: Optics, *, sun_kernel_deg: float
     clear = clear + beam * sun_radiance(suns, sky, kernel_deg=sun_kernel_deg)
     flux = np.full((1 + len(suns), len(optics)), 1 / len(optics))
     light = summed_scattered(transport, np.concatenate([overcast, clear]), flux, optics)
-    return _nominal_error(light)
+    return _nominal_error(scattered_variance(light, transport.n_paths))
 
 
 def nominal_straight_error(sky_seen: np.ndarray) -> np.ndarray:
@@ -117,12 +117,39 @@ def nominal_straight_error(sky_seen: np.ndarray) -> np.ndarray:
     """
     sky = patches(sky_seen.shape[2])
     overcast, clear, _ = _nominal_skies(sky)
-    return _nominal_error(_straight(sky_seen, np.concatenate([overcast, clear])))
+    light = _straight(sky_seen, np.concatenate([overcast, clear]))
+    return _nominal_error(light.var(axis=1, ddof=1) / light.shape[1])
 
 
-def _nominal_error(light: np.ndarray) -> np.ndarray:
-    """(n,) largest standard error of light (n, r, skies), where the first sky is overcast."""
-    error = np.sqrt(light.var(axis=1, ddof=1) / light.shape[1])
+def scattered_variance(light: np.ndarray, n_paths: np.ndarray) -> np.ndarray:
+    """Variance of scattered light, steadied by that of all sensors together.
+
+    Parameters
+    ----------
+    light : (n_sensors, r, t) float64
+        Of independent replicates.
+    n_paths : (n_sensors,) int64
+        Paths in each replicate.
+
+    Returns
+    -------
+    (n_sensors, t) float64
+        Of the mean over replicates. Few paths may bring most of a sensor's light; where none of
+        them was drawn, its replicates agree too well. The variance of counted light goes with its
+        mean over the number of paths: with the factor that all sensors share, this is worth as
+        many replicates as there are.
+    """
+    n_replicates = light.shape[1]
+    own, mean = light.var(axis=1, ddof=1) / n_replicates, light.mean(axis=1)
+    paths = n_paths[:, None]
+    with np.errstate(invalid="ignore"):
+        factor = (own * paths).sum(axis=0) / mean.sum(axis=0)
+    return 0.5 * (own + np.nan_to_num(factor) * mean / paths)
+
+
+def _nominal_error(variance: np.ndarray) -> np.ndarray:
+    """(n,) largest standard error under skies of which the first is overcast."""
+    error = np.sqrt(variance)
     error[:, 0] /= 2
     return error.max(axis=1)
 

@@ -80,7 +80,6 @@ def sunlit(
     # A point and a parallel beam leave nothing to chance.
     exact = sun_diameter_deg == 0 and aperture_m == 0
     most = 1 if exact else max(-(-max_rays // n_replicates), 1)
-    unseen = float(scene.meshes is not None)
     trace = sun_rays(
         scene,
         sensors_m,
@@ -97,8 +96,7 @@ def sunlit(
         square[pairs] += squares
         done[pairs] = rays
         share, every = total[pairs] / rays, rays * n_replicates
-        spread = np.maximum(square[pairs] / every - share.mean(axis=1) ** 2, 0)
-        error[pairs] = _standard_error(share, spread, every, unseen)
+        error[pairs] = _standard_error(share, square[pairs], every)
         pairs = pairs[error[pairs] > tolerance]
         before, rays = rays, min(2 * rays, most)
     share = total / np.maximum(done, 1)[:, None]
@@ -109,35 +107,47 @@ def sunlit(
     )
 
 
-def _standard_error(
-    share: np.ndarray, spread: np.ndarray, n_rays: int, unseen: float
-) -> np.ndarray:
+def _standard_error(share: np.ndarray, square: np.ndarray, n_rays: int) -> np.ndarray:
     """Standard error of the means of replicates, steadied by that of all pairs together.
 
     Parameters
     ----------
     share : (m, r) float64
         Means of replicates.
-    spread : (m,) float64
-        Variance of single rays: p (1 - p) where they hit or miss.
+    square : (m,) float64
+        Sum of the squares of what single rays see, of all replicates.
     n_rays : int
         Of all replicates together.
-    unseen : float
-        1 where leaves may be missed by all rays, which then have no variance (Laplace's rule of
-        succession gives 1 / n), 0 where nothing is hidden.
 
     Returns
     -------
     (m,) float64
-        Patterns are no better than chance where less than one ray a replicate differs from the
-        rest. Elsewhere they are, by a factor that all pairs share: this pooled variance and the
-        pair's own, a rough guess from few replicates, are averaged with their degrees of freedom.
+
+    Notes
+    -----
+    Replicates are independent: their variance is right on the mean of many pairs, but a rough guess
+    for one. It is averaged by degrees of freedom with that of single rays, times a factor by which
+    the pattern is better than chance, which all pairs share.
+
+    Where rays hit or miss and c of n differ from the rest, c at most as many as there are
+    replicates, that says little: the pair may be lit a bit more or a bit less. Its mean square
+    error is that of an even prior, (c + 2) / n². Where none differs it is smaller, since most
+    such pairs are lit or shaded throughout: 2 N₂ / (N₀ n²), with N_c pairs in which c rays differ
+    (Good 1953, Biometrika 40, 237-264; N₂ is taken as the mean of N₁ and N₂, one is added).
     """
     n_replicates = share.shape[1]
-    random = (spread + unseen / n_rays) / n_rays
+    mean = share.mean(axis=1)
+    spread = np.maximum(square / n_rays - mean**2, 0)
+    chance = spread / n_rays
     own = share.var(axis=1, ddof=1) / n_replicates
-    many = spread * n_rays > n_replicates
-    factor = min(own[many].sum() / random[many].sum(), 1.0) if many.any() else 1.0
+    hits = np.minimum(mean, 1 - mean) * n_rays
+    whole = np.abs(square - mean * n_rays) < 1e-4 * n_rays  # each ray sees all or nothing
+    few = whole & (hits < n_replicates + 0.5)
+    if own[~few].any():
+        chance[~few] *= min(own[~few].sum() / chance[~few].sum(), 1.0)
     freedom = n_replicates - 1
-    steadied = (PRIOR_WEIGHT * factor * random + freedom * own) / (PRIOR_WEIGHT + freedom)
-    return np.sqrt(np.where(many, steadied, random))
+    steadied = (PRIOR_WEIGHT * chance + freedom * own) / (PRIOR_WEIGHT + freedom)
+    none, some = few & (hits < 0.5), few & (hits > 0.5) & (hits < 2.5)
+    of_none = min((some.sum() + 2) / (none.sum() + 1), 2.0)
+    of_few = np.where(none, of_none, hits + 2) / n_rays**2
+    return np.sqrt(np.where(few, of_few, steadied))

@@ -1,0 +1,77 @@
+"""Is the stated Monte Carlo error of light that of repeated runs? Thirty seeds in one scene.
+
+    python benchmarks/errors.py [--seeds 30] [--docs docs]
+
+For polygons and voxels of a synthetic apple tree: the stated standard error and the scatter of light
+between seeds, root mean squares over sensors and times, as shares of the open sky's light, and the
+standard deviation of the deviations from the mean over all seeds divided by the stated errors,
+which should be 1 (docs/data/light_errors.csv).
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
+
+import crown
+
+from dapple.light import series, transport, visibility
+from dapple.scene import traced
+
+TOLERANCE = 0.005
+KINDS = ("polygons", "voxels_0.2", "voxels_1.0")
+
+
+def repeated(kind: str, n_seeds: int) -> pd.DataFrame:
+    """Stated and actual errors of direct light, of sky and scattered light, and of their sum."""
+    scene, sensors_m = traced.load(crown.scene(kind, 60_000), "llvm_ad_mono"), crown.sensors(25)
+    sky, optics = crown.sky(12), crown.optics()
+    open_sky = series.open_sky_par(sky).to_numpy()
+    beam = series.level_beam(sky) / open_sky
+    light = {part: [] for part in ("direct", "sky and scattered", "all")}
+    error = {part: [] for part in light}
+    for seed in range(n_seeds):
+        sunlit = visibility.sunlit(
+            scene, sensors_m, series.towards_sun(sky), tolerance=series.DIRECT_SHARE * TOLERANCE,
+            max_rays=1 << 14, seed=1000 + seed,
+        )  # fmt: skip
+        counted = transport.collect(
+            scene, sensors_m, n_paths=2048, n_patches=577, max_orders=30, seed=2000 + seed,
+            tolerance=series.PATH_SHARE * TOLERANCE, optics=crown.optics(4),
+        )  # fmt: skip
+        found = series.compute(sunlit, counted, sky, optics, sun_kernel_deg=8.0)
+        both, of_sun = found.standard_error / open_sky, sunlit.standard_error * beam
+        values = found.direct, found.sky + found.scattered, found.par
+        errors = of_sun, np.sqrt(np.maximum(both**2 - of_sun**2, 0)), both
+        for part, value, stated in zip(light, values, errors, strict=True):
+            light[part].append(value / open_sky)
+            error[part].append(stated)
+    rows = []
+    for part in light:
+        value, stated = np.array(light[part]), np.array(error[part])
+        scatter = (value - value.mean(axis=0)) * np.sqrt(n_seeds / (n_seeds - 1))
+        z = scatter[stated > 0] / stated[stated > 0]
+        rows.append(
+            {"scene": kind, "part": part, "stated": np.sqrt((stated**2).mean()),
+             "actual": np.sqrt((scatter**2).mean()), "z_spread": z.std()}
+        )  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=30)
+    parser.add_argument("--docs", type=Path, default=Path(__file__).parents[1] / "docs")
+    options = parser.parse_args()
+    table = pd.concat([repeated(kind, options.seeds) for kind in KINDS])
+    path = options.docs / "data" / "light_errors.csv"
+    table.to_csv(path, index=False, float_format="%.4g")
+    print(table.to_string(index=False, float_format=lambda value: f"{value:.4g}"))
+
+
+if __name__ == "__main__":
+    main()
