@@ -48,7 +48,7 @@ def main() -> None:
         "no gain of the site": score(run.light(loaded, run.sky(), shift_m)),
         "leaves that do not sway": score(run.light(loaded, sky, shift_m, entrance_m=0.0)),
         "a point for the sun, no sway": score(
-            run.light(loaded, sky, shift_m, entrance_m=0.0, sun_diameter_deg=0.0)
+            run.light(loaded, sky, shift_m, entrance_m=0.0, sun="point")
         ),
         "leaves clumped on shoots": score(run.light(clumped(run), sky, shift_m)),
         "an isotropic sky": score(run.light(loaded, isotropic, shift_m)),

@@ -2,10 +2,10 @@
 
     python benchmarks/errors.py [--seeds 30] [--docs docs]
 
-For polygons and voxels of a synthetic apple tree: the stated standard error and the scatter of light
-between seeds, root mean squares over sensors and times, as shares of the open sky's light, and the
-standard deviation of the deviations from the mean over all seeds divided by the stated errors,
-which should be 1 (docs/data/light_errors.csv).
+For polygons and voxels of a synthetic apple tree: the stated standard error and the scatter of
+light between seeds, root mean squares over sensors and times, as shares of the open sky's light,
+and the standard deviation of the deviations from the mean over all seeds divided by the stated
+errors, which should be 1 (docs/data/light_errors.csv).
 """
 
 import argparse
@@ -19,10 +19,13 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
 import crown
 
-from dapple.light import series, transport, visibility
+from dapple import steps
+from dapple.light import series
+from dapple.light.light_model import Model, Tracing
 from dapple.scene import traced
 
-TOLERANCE = 0.005
+MODEL = Model(sky_patches=577, max_orders=30)
+TRACING = Tracing(paths=2048, sky_rays=8192, tolerance=0.005, max_growth=64.0)
 KINDS = ("polygons", "voxels_0.2", "voxels_1.0")
 
 
@@ -35,15 +38,11 @@ def repeated(kind: str, n_seeds: int) -> pd.DataFrame:
     light = {part: [] for part in ("direct", "sky and scattered", "all")}
     error = {part: [] for part in light}
     for seed in range(n_seeds):
-        sunlit = visibility.sunlit(
-            scene, sensors_m, series.towards_sun(sky), tolerance=series.DIRECT_SHARE * TOLERANCE,
-            max_rays=1 << 14, seed=1000 + seed,
-        )  # fmt: skip
-        counted = transport.collect(
-            scene, sensors_m, n_paths=2048, n_patches=577, max_orders=30, seed=2000 + seed,
-            tolerance=series.PATH_SHARE * TOLERANCE, optics=crown.optics(4),
-        )  # fmt: skip
-        found = series.compute(sunlit, counted, sky, optics, sun_kernel_deg=8.0)
+        sunlit = steps.sun(scene, sensors_m, sky, MODEL, TRACING, seed=1000 + seed)
+        counted = steps.paths(
+            scene, sensors_m, MODEL, TRACING, optics=crown.optics(4), seed=2000 + seed
+        )
+        found = steps.products(sunlit, counted, sky, optics, MODEL, TRACING)
         both, of_sun = found.standard_error / open_sky, sunlit.standard_error * beam
         values = found.direct, found.sky + found.scattered, found.par
         errors = of_sun, np.sqrt(np.maximum(both**2 - of_sun**2, 0)), both

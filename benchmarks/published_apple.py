@@ -13,9 +13,11 @@ import yaml
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
+from dapple import steps
 from dapple.config.settings import Settings, validate
 from dapple.formats import json, meshes
-from dapple.light import series, transport, visibility
+from dapple.light import series
+from dapple.light.light_model import Model, Tracing
 from dapple.scene import scene_files, scene_optics, sensors, traced
 from dapple.scene.surfaces import Scene
 from dapple.sky.radiation_series import broadband
@@ -26,7 +28,7 @@ from dapple.stats.pairs import pair
 from dapple.streams import stream_seed
 from dapple.times import time_range
 
-EFFORT = {"n_paths": 2048, "n_sky_rays": 4096, "max_orders": 12, "n_patches": 577}
+RAYS = {"paths": 2048, "sky_rays": 4096, "max_shadow_rays": 4096}
 
 
 @dataclass
@@ -106,25 +108,23 @@ class Run:
         sky: xr.Dataset,
         shift_m: tuple[float, float],
         *,
-        sun_diameter_deg: float | None = None,
+        sun: str = "disc",
         entrance_m: float | None = None,
     ) -> list[series.Light]:
         """Light at all sensors under every placement, the tree moved by a shift."""
         points_m = self.sensors[["x_m", "y_m", "z_m"]].to_numpy() - [*shift_m, 0.0]
-        own = self.settings.light
-        sun_diameter_deg = own.sun_diameter_deg if sun_diameter_deg is None else sun_diameter_deg
-        entrance_m = own.entrance_m if entrance_m is None else entrance_m
+        own, model = self.settings.light, Model(sun=sun, sky_patches=577, bands=len(self.optics))
+        tracing = Tracing(
+            **RAYS,
+            sun_diameter_deg=own.sun_diameter_deg,
+            aperture_m=own.entrance_m if entrance_m is None else entrance_m,
+        )
         result = []
         for number, scene in enumerate(scenes):
-            seen = visibility.sunlit(
-                scene, points_m, series.towards_sun(sky), tolerance=0.005, max_rays=4096,
-                sun_diameter_deg=sun_diameter_deg, aperture_m=entrance_m,
-                seed=stream_seed(1, number),
-            )  # fmt: skip
-            paths = transport.collect(
-                scene, points_m, seed=stream_seed(2, number), aperture_m=entrance_m, **EFFORT
-            )
-            result.append(series.compute(seen, paths, sky, self.optics, sun_kernel_deg=8.0))
+            of_sun, of_paths = (stream_seed(which, number) for which in (1, 2))
+            sunlit = steps.sun(scene, points_m, sky, model, tracing, seed=of_sun)
+            paths = steps.paths(scene, points_m, model, tracing, seed=of_paths)
+            result.append(steps.products(sunlit, paths, sky, self.optics, model, tracing))
         return result
 
     def score(self, par: np.ndarray, chosen: Sequence[str]) -> dict[str, float]:

@@ -2,12 +2,15 @@
 
 import numpy as np
 import pytest
-
 from benchmarks import crown
-from dapple.light import series, transport, visibility
+
+from dapple import steps
+from dapple.light.light_model import Model, Tracing
 from dapple.scene import traced
 
-N_SEEDS, TOLERANCE = 24, 0.01
+N_SEEDS = 24
+MODEL = Model(sky_patches=145, max_orders=20, bands=4)
+TRACING = Tracing(1024, 2320, max_shadow_rays=8192, tolerance=0.01, max_growth=64.0)
 
 
 @pytest.mark.parametrize("kind", ["polygons", "voxels_0.5"])
@@ -17,15 +20,9 @@ def test_deviations_over_stated_errors_have_a_spread_of_one(kind):
     sky, optics = crown.sky(5, 4), crown.optics(4)
     par, error = [], []
     for seed in range(N_SEEDS):
-        sunlit = visibility.sunlit(
-            scene, sensors_m, series.towards_sun(sky), tolerance=series.DIRECT_SHARE * TOLERANCE,
-            max_rays=1 << 13, seed=seed,
-        )  # fmt: skip
-        counted = transport.collect(
-            scene, sensors_m, n_paths=1024, n_patches=145, max_orders=20, seed=100 + seed,
-            tolerance=series.PATH_SHARE * TOLERANCE, optics=optics, n_sky_rays=2320,
-        )  # fmt: skip
-        light = series.compute(sunlit, counted, sky, optics, sun_kernel_deg=8.0)
+        sunlit = steps.sun(scene, sensors_m, sky, MODEL, TRACING, seed=seed)
+        counted = steps.paths(scene, sensors_m, MODEL, TRACING, optics=optics, seed=100 + seed)
+        light = steps.products(sunlit, counted, sky, optics, MODEL, TRACING)
         par.append(light.par)
         error.append(light.standard_error)
     scatter = (np.array(par) - np.mean(par, axis=0)) * np.sqrt(N_SEEDS / (N_SEEDS - 1))
