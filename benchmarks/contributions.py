@@ -13,9 +13,9 @@ import numpy as np
 import pandas as pd
 from published_apple import Run
 
-from dapple.light import series
 from dapple.scene import traced
 from dapple.scene.surfaces import Scene, of_kinds
+from dapple.sky.open_sky import open_sky_par
 from dapple.streams import stream_seed
 from dapple.virtual.leaves import along_wood
 
@@ -41,7 +41,7 @@ def main() -> None:
         return run.score(light, reporting)
 
     full = run.light(loaded, sky, shift_m)
-    open_sky = series.open_sky_par(sky).to_numpy()
+    open_sky = open_sky_par(sky).to_numpy()
     rows = {
         "full model": score(full),
         "one placement of the leaves": score(full[:1]),
@@ -66,8 +66,8 @@ def main() -> None:
 def with_diffuse_share_of(sky, other):
     """The same total light on the level, split into beam and diffuse as in another sky."""
     changed = sky.copy()
-    total = series.open_sky_par(sky)
-    share = other["diffuse_horizontal_umol_m2_s"].sum("band") / series.open_sky_par(other)
+    total = open_sky_par(sky)
+    share = other["diffuse_horizontal_umol_m2_s"].sum("band") / open_sky_par(other)
     own_diffuse = sky["diffuse_horizontal_umol_m2_s"].sum("band")
     changed["diffuse_horizontal_umol_m2_s"] *= share * total / own_diffuse
     changed["beam_normal_umol_m2_s"] *= (1 - share) * total / (total - own_diffuse)

@@ -20,12 +20,16 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 import crown
 
 from dapple import steps
-from dapple.light import series
 from dapple.light.light_model import Model, Tracing
 from dapple.scene import traced
+from dapple.sky.open_sky import level_beam, open_sky_par
+from dapple.sky.solar_disc import SUN_DIAMETER_DEG
 
 MODEL = Model(sky_patches=577, max_orders=30)
-TRACING = Tracing(paths=2048, sky_rays=8192, tolerance=0.005, max_growth=64.0)
+TRACING = Tracing(
+    paths=2048, sky_rays=8192, max_shadow_rays=16384, tolerance=0.005, max_growth=64.0,
+    sun_diameter_deg=SUN_DIAMETER_DEG, sun_kernel_deg=8.0,
+)  # fmt: skip
 KINDS = ("polygons", "voxels_0.2", "voxels_1.0")
 
 
@@ -33,8 +37,8 @@ def repeated(kind: str, n_seeds: int) -> pd.DataFrame:
     """Stated and actual errors of direct light, of sky and scattered light, and of their sum."""
     scene, sensors_m = traced.load(crown.scene(kind, 60_000), "llvm_ad_mono"), crown.sensors(25)
     sky, optics = crown.sky(12), crown.optics()
-    open_sky = series.open_sky_par(sky).to_numpy()
-    beam = series.level_beam(sky) / open_sky
+    open_sky = open_sky_par(sky).to_numpy()
+    beam = level_beam(sky) / open_sky
     light = {part: [] for part in ("direct", "sky and scattered", "all")}
     error = {part: [] for part in light}
     for seed in range(n_seeds):

@@ -16,19 +16,19 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 from dapple import steps
 from dapple.config.settings import Settings, validate
 from dapple.formats import json, meshes
-from dapple.light import series
+from dapple.light import light_datasets, series
 from dapple.light.light_model import Model, Tracing
 from dapple.scene import scene_files, scene_optics, sensors, traced
 from dapple.scene.surfaces import Scene
 from dapple.sky.radiation_series import broadband
 from dapple.sky.sky_radiance import scaled, sky_dataset
 from dapple.sky.sun import Site
-from dapple.stats import correlation, measured
+from dapple.stats import measured, measures
 from dapple.stats.pairs import pair
 from dapple.streams import stream_seed
 from dapple.times import time_range
 
-RAYS = {"paths": 2048, "sky_rays": 4096, "max_shadow_rays": 4096}
+RAYS = {"paths": 2048, "sky_rays": 4096, "max_shadow_rays": 4096, "tolerance": 0.005}
 
 
 @dataclass
@@ -117,6 +117,7 @@ class Run:
         tracing = Tracing(
             **RAYS,
             sun_diameter_deg=own.sun_diameter_deg,
+            sun_kernel_deg=own.transport.sun_kernel_deg,
             aperture_m=own.entrance_m if entrance_m is None else entrance_m,
         )
         result = []
@@ -130,13 +131,13 @@ class Run:
     def score(self, par: np.ndarray, chosen: Sequence[str]) -> dict[str, float]:
         """r, RMSE and bias of light (sensor, time) on the records of chosen sensors."""
         zero = np.zeros_like(par)
-        dataset = series.dataset(
+        dataset = light_datasets.dataset(
             list(self.sensors["sensor"]), self.times, par=par, direct=zero, sky=zero,
             scattered=zero, standard_error=zero,
         )  # fmt: skip
         records = self.records[self.records["sensor"].isin(chosen)]
         table = pair(dataset.sel(sensor=list(chosen)), records, reconstruction="")
         difference = (table["simulated"] - table["measured"]).to_numpy()
-        r = correlation.pearson(table["measured"].to_numpy(), table["simulated"].to_numpy())
+        r = measures.pearson(table["measured"].to_numpy(), table["simulated"].to_numpy())
         rmse = float(np.sqrt((difference**2).mean()))
         return {"n": len(table), "r": r, "rmse": rmse, "bias": float(difference.mean())}

@@ -7,10 +7,14 @@ from benchmarks import crown
 from dapple import steps
 from dapple.light.light_model import Model, Tracing
 from dapple.scene import traced
+from dapple.sky.solar_disc import SUN_DIAMETER_DEG
 
 N_SEEDS = 24
 MODEL = Model(sky_patches=145, max_orders=20, bands=4)
-TRACING = Tracing(1024, 2320, max_shadow_rays=8192, tolerance=0.01, max_growth=64.0)
+TRACING = Tracing(
+    paths=1024, sky_rays=2320, max_shadow_rays=8192, tolerance=0.01, max_growth=64.0,
+    sun_diameter_deg=SUN_DIAMETER_DEG, sun_kernel_deg=8.0,
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", ["polygons", "voxels_0.5"])
