@@ -13,7 +13,7 @@ Makes   advice.yaml                       what each refinement changes and costs
 # What the pilot and the grid have in common with the run itself.
 PILOT = {
     **tracing("max_orders"),
-    "ground_z_m": settings.ground_z_m,
+    "ground_z_m": GROUND_Z_M,
     "variant": f"{VARIANT}_mono",
 }
 
@@ -53,6 +53,8 @@ if LIT:
     rule advice:
         input:
             **sized(settings.advice),
+            ground=GROUND,
+            shade=SHADE,
             code=code("advice"),
         output:
             advice=results("advice.yaml"),
@@ -110,6 +112,8 @@ if LIT:
     rule tradeoff_points:
         input:
             **sized(settings.tradeoff),
+            ground=GROUND,
+            shade=SHADE,
             code=code("tradeoff_points"),
         output:
             points=results("tradeoff/points.csv"),

@@ -9,7 +9,8 @@ Makes   clean/cloud.laz, clean/clean.json        without noise, one point a voxe
 
 rule clean:
     input:
-        points=results("scan/points.laz"),
+        points=results("tree/points.laz" if ONE_OF_MANY else "scan/points.laz"),
+        ground=GROUND,
         code=code("clean"),
     output:
         cloud=results("clean/cloud.laz"),
@@ -25,7 +26,7 @@ rule clean:
         mem_mb=4000,
     params:
         **settings.clean.model_dump(exclude={"distance_points"}),
-        ground_z_m=settings.ground_z_m,
+        ground_z_m=GROUND_Z_M,
         pdal=settings.tools.pdal,
         cloudcompare=settings.tools.cloudcompare,
     message:

@@ -44,6 +44,8 @@ REFERENCE_TIMES = list(
 SENSOR_TABLE = settings.sensors.path or "sensors"
 BATCH = settings.light.timestep.times_per_job
 REFERENCE_BATCHES = range(-(-len(REFERENCE_TIMES) // BATCH))
+GROUND_Z_M = settings.ground_z_m or 0.0
+ONE_OF_MANY = settings.tree.id is not None or settings.tree.at is not None
 SKY = {
     "site": settings.site.model_dump(exclude={"timezone"}),
     "radiation": settings.radiation.broadband(),
@@ -76,6 +78,12 @@ def results(path):
 
 # Frame and clock, where records are to tell them; else they are as configured.
 FITTED = results("registration/registration.json") if settings.registration.fit else []
+# A cloud has an origin of its own, unless the configuration knows another.
+OWN_FRAME = (
+    results("scan/frame.json")
+    if settings.source == "cloud" and settings.registration.origin_m is None
+    else []
+)
 
 
 def logs(name):
@@ -158,6 +166,10 @@ def stream(*names):
     return stream_seed(settings.seed, *names)
 
 
+GROUND = results("scan/ground.nc") if settings.source == "cloud" else []
+SHADE = results("tree/neighbours.ply") if ONE_OF_MANY else []
+
+
 def leaf_meshes(reconstruction):
     """The leaves of a reconstruction made of polygons, one file a placement."""
     return [results(f"structure/{reconstruction}/leaves_{p}.ply") for p in PLACEMENTS]
@@ -216,7 +228,7 @@ def clumping_correction(wildcards):
 def sized(section):
     """Geometries of all sizes that a section asks for, with sensors and light, by name of input."""
     polygons = section.polygon_sizes_m if settings.source != "wood" else ()
-    has_shots = settings.source != "cloud" or settings.cloud.shots != "none"
+    has_shots = settings.has_shots
     voxels = section.voxel_sizes_m if has_shots else ()
     truth = ("leaves_0", "wood") if settings.source == "virtual" else ()
     return {

@@ -18,6 +18,8 @@ rule timesteps:
         sky=results("sky/sky.nc"),
         optics=results("sky/optics.nc"),
         sensors=results("sky/sensors.csv"),
+        ground=GROUND,
+        shade=SHADE,
         code=code("timesteps"),
     output:
         light=results("light/timesteps/{reconstruction}/{batch}.nc"),
@@ -32,7 +34,7 @@ rule timesteps:
         mem_mb=4000,
     params:
         engine=REFERENCE,
-        ground_z_m=settings.ground_z_m,
+        ground_z_m=GROUND_Z_M,
         sensor_table=SENSOR_TABLE,
         times=REFERENCE_TIMES,
         positions=timestep_positions,
@@ -81,6 +83,8 @@ if settings.light.engine == "transport":
             wood=wood_mesh,
             sensors=results("sky/sensors.csv"),
             model=results("light/model.json") if ADVISED else [],
+            ground=GROUND,
+            shade=SHADE,
             code=code("transport"),
         output:
             transport=results("light/transport/{reconstruction}_{placement}.nc"),
@@ -103,7 +107,7 @@ if settings.light.engine == "transport":
                 "sun_kernel_deg",
                 "aperture_m",
             ),
-            ground_z_m=settings.ground_z_m,
+            ground_z_m=GROUND_Z_M,
             sensor_table=SENSOR_TABLE,
             variant=f"{VARIANT}_mono",
             seed=lambda wildcards: stream("transport", wildcards.placement),
@@ -121,6 +125,8 @@ if settings.light.engine == "transport":
             sky=results("sky/sky.nc"),
             optics=results("sky/optics.nc"),
             model=results("light/model.json") if ADVISED else [],
+            ground=GROUND,
+            shade=SHADE,
             code=code("light"),
         output:
             light=results("light/{reconstruction}.nc"),
@@ -141,7 +147,7 @@ if settings.light.engine == "transport":
                 "sun_diameter_deg",
                 "aperture_m",
             ),
-            ground_z_m=settings.ground_z_m,
+            ground_z_m=GROUND_Z_M,
             n_times=N_TIMES,
             variant=f"{VARIANT}_mono",
             seed=stream("light"),
@@ -157,6 +163,8 @@ rule ground_map:
         wood=results("structure/polygons/wood.ply"),
         sky=results("sky/sky.nc"),
         optics=results("sky/optics.nc"),
+        ground=GROUND,
+        shade=SHADE,
         code=code("ground_map"),
     output:
         map=results("light/ground_map.nc"),
@@ -175,7 +183,7 @@ rule ground_map:
         spacing_m=settings.figures.map_spacing_m,
         margin_m=settings.figures.map_margin_m,
         engine=REFERENCE,
-        ground_z_m=settings.ground_z_m,
+        ground_z_m=GROUND_Z_M,
         seed=stream("ground_map"),
     message:
         said("light on the ground around the tree")

@@ -19,6 +19,7 @@ if settings.registration.fit:
                 else []
             ),
             sky_table=sky_table(),
+            frame=OWN_FRAME,
             code=code("registration"),
         output:
             registration=results("registration/registration.json"),

@@ -6,6 +6,8 @@ Makes   config.yaml                       the merged configuration
         structure/truth/*.ply             virtual: the tree itself, leaf and wood area known
         structure/polygons/*.ply          wood: real wood, virtual leaves along it
         scan/points.laz                   points with reflectance and deviation, where known
+        scan/frame.json, scan/ground.nc   cloud: origin and coordinate system; heights of the ground
+        tree/                             cloud, tree named: its points, stems, neighbours as shade
         scan/shots.parquet                every shot with its returns, misses included
 """
 
@@ -136,12 +138,12 @@ if settings.source == "cloud":
                 if settings.cloud.scan_positions
                 else []
             ),
+            check=ancient(results("check.json")),
             code=code("ingest"),
         output:
             points=results("scan/points.laz"),
-            shots=(
-                results("scan/shots.parquet") if settings.cloud.shots != "none" else []
-            ),
+            frame=results("scan/frame.json"),
+            shots=results("scan/shots.parquet") if settings.has_shots else [],
         log:
             logs("ingest"),
         benchmark:
@@ -152,13 +154,69 @@ if settings.source == "cloud":
         resources:
             mem_mb=4000,
         params:
-            shots=settings.cloud.shots,
+            unit=settings.cloud.unit,
+            up=settings.cloud.up,
+            shots=settings.cloud.shots if settings.has_shots else "none",
             scan_frame=settings.scan_frame.model_dump(),
             required=list(CLASSIFIERS[settings.classify.method].needs),
         message:
             said("read {input.cloud}")
         script:
             "../scripts/ingest.py"
+
+    rule find_ground:
+        input:
+            points=results("scan/points.laz"),
+            frame=results("scan/frame.json"),
+            code=code("find_ground"),
+        output:
+            ground=results("scan/ground.nc"),
+        log:
+            logs("find_ground"),
+        benchmark:
+            benchmarks("find_ground")
+        conda:
+            "../envs/dapple.yaml"
+        threads: 1
+        resources:
+            mem_mb=4000,
+        params:
+            ground_z_m=settings.ground_z_m,
+        message:
+            said("the ground under the cloud")
+        script:
+            "../scripts/find_ground.py"
+
+    if ONE_OF_MANY:
+
+        rule one_tree:
+            input:
+                points=results("scan/points.laz"),
+                ground=results("scan/ground.nc"),
+                code=code("one_tree"),
+            output:
+                points=results("tree/points.laz"),
+                neighbours=results("tree/neighbours.ply"),
+                stems=results("tree/stems.csv"),
+                tree=results("tree/tree.json"),
+            log:
+                logs("one_tree"),
+            benchmark:
+                benchmarks("one_tree")
+            conda:
+                "../envs/dapple.yaml"
+            threads: 2
+            resources:
+                mem_mb=4000,
+            params:
+                **dict(settings.tree),
+                buffer_m=settings.polygons.buffer_m,
+                mitre_limit=settings.polygons.mitre_limit,
+                seed=stream("neighbours"),
+            message:
+                said("one tree out of the plot")
+            script:
+                "../scripts/one_tree.py"
 
 else:
     SCANNED = "truth" if settings.source == "virtual" else "polygons"
@@ -183,7 +241,7 @@ else:
         params:
             **dict(settings.scan),
             seed=stream("scan"),
-            ground_z_m=settings.ground_z_m,
+            ground_z_m=GROUND_Z_M,
         message:
             said("scan the tree from {params.positions} positions")
         script:

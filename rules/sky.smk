@@ -75,8 +75,9 @@ rule optics:
 rule sensors:
     input:
         table=data(settings.sensors.path) if settings.sensors.kind == "table" else [],
-        registration=FITTED if settings.sensors.kind == "table" else [],
+        frame=(FITTED or OWN_FRAME) if settings.sensors.kind == "table" else [],
         wood=stem_wood(),
+        ground=GROUND,
         code=code("sensors"),
     output:
         sensors=results("sky/sensors.csv"),
@@ -98,7 +99,7 @@ rule sensors:
             if settings.sensors.kind == "table"
             else None
         ),
-        ground_z_m=settings.ground_z_m,
+        ground_z_m=GROUND_Z_M,
     message:
         said("sensors in the local frame")
     script:

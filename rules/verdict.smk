@@ -12,11 +12,7 @@ JUDGED = [name for name in settings.reconstructions if name != "truth"]
 rule verdict:
     input:
         cloud=results("classes/cloud.laz"),
-        shots=(
-            results("scan/shots.parquet")
-            if settings.source != "cloud" or settings.cloud.shots != "none"
-            else []
-        ),
+        shots=(results("scan/shots.parquet") if settings.has_shots else []),
         leaves=leaf_meshes("polygons") if "polygons" in JUDGED else [],
         wood=(
             results("structure/polygons/wood.ply")
@@ -33,6 +29,8 @@ rule verdict:
         sensors=results("sky/sensors.csv") if LIT else [],
         records=results("statistics/records.csv") if COMPARED else [],
         model=beside_code("verdict/verdict_model.json"),
+        ground=GROUND,
+        shade=SHADE,
         code=code("verdict"),
     output:
         verdict=results("verdict.json"),
@@ -50,7 +48,7 @@ rule verdict:
         polygon_voxel_m=(
             settings.polygons.voxel_size_m if settings.source != "wood" else None
         ),
-        ground_z_m=settings.ground_z_m,
+        ground_z_m=GROUND_Z_M,
         variant=f"{VARIANT}_mono",
         sun_diameter_deg=settings.light.sun_diameter_deg,
         aperture_m=settings.light.entrance_m,

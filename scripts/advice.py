@@ -23,6 +23,7 @@ HEAD = """\
 
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
+    around = scene_files.around(inputs.ground or params.ground_z_m, inputs.shade)
     sky, optics = netcdf.read(inputs.sky), scene_optics.read(inputs.optics)
     table, stamps = tables.read(inputs.sensors), netcdf.times(sky)
     chosen = pilot.spread(len(table), params.sensors)
@@ -36,10 +37,10 @@ def main(snakemake):
         repeats=params.repeats,
         seed=params.seed,
     )
-    base = scene_files.read([inputs.leaves], inputs.wood, params.ground_z_m)[0]
+    base = scene_files.read([inputs.leaves], inputs.wood, around)[0]
     truth = None
     if inputs.truth:
-        true = scene_files.read([inputs.truth[0]], inputs.truth[1], params.ground_z_m)[0]
+        true = scene_files.read([inputs.truth[0]], inputs.truth[1], around)[0]
         truth = one.light(traced.load(true, params.variant), one.finest)[0]
     facts, model = advise.advise(
         one,
@@ -52,8 +53,8 @@ def main(snakemake):
     )
     print(f"chosen: {model}", flush=True)
     sizes = geometries.polygons(
-        params.polygon_sizes_m, inputs.sized_leaves, inputs.sized_wood, params.ground_z_m
-    ) + geometries.voxels(params.voxel_sizes_m, inputs.voxels, base)
+        params.polygon_sizes_m, inputs.sized_leaves, inputs.sized_wood, around
+    ) + geometries.voxels(params.voxel_sizes_m, inputs.voxels, base, around)
     effects = advise.geometry_effects(one, base, sizes, truth=truth, variant=params.variant)
     facts |= {
         "geometry": refinements.rows(effects),

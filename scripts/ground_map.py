@@ -9,12 +9,14 @@ from dapple.workflow import run
 
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
+    around = scene_files.around(inputs.ground or params.ground_z_m, inputs.shade)
     sky = netcdf.read(inputs.sky)
     chosen = spread(netcdf.times(sky), params.times, 4, params.timezone)
     # One placement is what stands there at a time; a mean would blur its flecks.
-    scene = scene_files.read(inputs.leaves[:1], inputs.wood, params.ground_z_m)[0]
+    scene = scene_files.read(inputs.leaves[:1], inputs.wood, around)[0]
     par = par_on_ground(
         scene,
+        around.ground,
         sky.isel(time=chosen),
         scene_optics.read(inputs.optics),
         spacing_m=params.spacing_m,

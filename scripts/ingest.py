@@ -5,20 +5,23 @@ import pandas as pd
 from dapple.cloud import ordered, selection
 from dapple.cloud.ingest import shots_from_scan
 from dapple.cloud.lattice import ScanFrame
-from dapple.formats import clouds, shots
+from dapple.formats import clouds, json, shots
 from dapple.frames import to_local
 from dapple.workflow import run
 
 
 def main(snakemake):
     params, path = snakemake.params, snakemake.input.cloud
-    cloud, source = selection.take(*clouds.read_with_source(path), path)
+    cloud, source = selection.take(
+        *clouds.read_with_source(path), path, unit=params.unit, up=params.up
+    )
     for attribute in params.required:
         clouds.require(cloud, attribute, path, source.notes)
     print(f"{path}: {len(cloud)} points, origin {cloud.origin_m.tolist()}")
     print(*(f"left out: {n:,} points, {why}" for why, n in source.left_out.items()), sep="\n")
     print(*source.notes, sep="\n")
     clouds.write(snakemake.output.points, cloud)
+    json.write(snakemake.output.frame, {"origin_m": cloud.origin_m, "crs": source.crs})
     facts = {"scans": []}
     match params.shots:
         case "recorded":

@@ -11,6 +11,7 @@ from dapple.workflow import run
 
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
+    around = scene_files.around(inputs.ground or params.ground_z_m, inputs.shade)
     sky, optics = netcdf.read(inputs.sky), scene_optics.read(inputs.optics)
     table = tables.read(inputs.sensors)
     sensors_m = table[["x_m", "y_m", "z_m"]].to_numpy()
@@ -18,7 +19,7 @@ def main(snakemake):
     tracing = Tracing(**params.tracing)
     placements = []
     for number, (leaves, counted) in enumerate(zip(inputs.leaves, inputs.transports, strict=True)):
-        scene = scene_files.read([leaves], inputs.wood, params.ground_z_m)[0]
+        scene = scene_files.read([leaves], inputs.wood, around)[0]
         loaded, seed = traced.load(scene, params.variant), stream_seed(params.seed, number)
         sunlit = steps.sun(loaded, sensors_m, sky, model, tracing, seed=seed)
         paths = transport_files.read(counted)

@@ -15,6 +15,8 @@ from dapple.workflow import run
 
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
+    # The cloud's own origin, unless the configuration knows another.
+    known = json.read(inputs.frame)["origin_m"] if inputs.frame else params.origin_m or (0.0,) * 3
     site = Site(**params.site)
     skies = [measured_sky.read(path) for path in inputs.sky_table]
 
@@ -23,7 +25,7 @@ def main(snakemake):
         measured = [sky.at(times) for sky in skies]
         return sky_dataset(times, site, radiation.values, *measured, **params.atmosphere)
 
-    table = sensors.read(inputs.sensors, params.origin_m, **params.sensors)
+    table = sensors.read(inputs.sensors, known, **params.sensors)
     found = shading.register(
         scene_files.read(inputs.leaves, inputs.wood),
         table,
@@ -40,7 +42,7 @@ def main(snakemake):
         seed=params.seed,
     )
     shift_m = np.array([found["east_m"], found["north_m"], 0.0])
-    origin_m = np.array(params.origin_m) + shift_m
+    origin_m = np.array(known) + shift_m
     json.write(snakemake.output.registration, {"fitted": True, "origin_m": origin_m, **found})
 
 

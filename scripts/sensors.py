@@ -1,25 +1,23 @@
 """Sensors in the local frame, none of them below the ground."""
 
 from dapple.formats import json, meshes, tables
-from dapple.scene import sensors
+from dapple.scene import scene_files, sensors
 from dapple.structure.stem import stem_position
 from dapple.workflow import run
 
 
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
+    ground = scene_files.around(inputs.ground or params.ground_z_m).ground
     if params.kind == "table":
-        fitted = json.read(inputs.registration) if inputs.registration else {}
-        origin_m = fitted.get("origin_m", params.origin_m)
-        table = sensors.read(inputs.table, origin_m, **params.table)
+        known = json.read(inputs.frame)["origin_m"] if inputs.frame else params.origin_m
+        table = sensors.read(inputs.table, known or (0.0, 0.0, 0.0), **params.table)
+        if inputs.ground:
+            table = sensors.lifted(table, ground)
     else:
-        table = sensors.grid_around(
-            stem_position(meshes.read_ply(inputs.wood)),
-            **params.grid,
-            ground_z_m=params.ground_z_m,
-        )
-    where = str(inputs.table or "sensors")
-    sensors.check(table, {}, ground_z_m=params.ground_z_m, where=where)
+        stem_m = stem_position(meshes.read_ply(inputs.wood))
+        table = sensors.grid_around(stem_m, **params.grid, ground=ground)
+    sensors.check(table, ground=ground, where=str(inputs.table or "sensors"))
     tables.write(snakemake.output.sensors, table, None)
 
 

@@ -8,11 +8,11 @@ from dapple.workflow import run
 
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
-    scenes = scene_files.read(inputs.leaves, inputs.wood, params.ground_z_m)
+    around = scene_files.around(inputs.ground or params.ground_z_m, inputs.shade)
+    scenes = scene_files.read(inputs.leaves, inputs.wood, around)
     table = tables.read(inputs.sensors)
     for scene in scenes:
-        meshes = {surface.optics: surface.mesh for surface in scene.filled}
-        sensors.check(table, meshes, where=params.sensor_table)
+        sensors.check(table, scene.filled, where=params.sensor_table)
     reference = timestep_series.Reference(
         scenes,
         netcdf.read(inputs.sky).isel(time=params.times),

@@ -10,10 +10,11 @@ from dapple.workflow import run
 
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
+    around = scene_files.around(inputs.ground or params.ground_z_m, inputs.shade)
     sky, table = netcdf.read(inputs.sky), tables.read(inputs.sensors)
     truth = None
     if inputs.truth:
-        truth = scene_files.read([inputs.truth[0]], inputs.truth[1], params.ground_z_m)[0]
+        truth = scene_files.read([inputs.truth[0]], inputs.truth[1], around)[0]
     grid = Grid(
         table.iloc[pilot.spread(len(table), params.sensors)],
         sky.isel(time=pilot.daylight_times(sky, params.times)),
@@ -30,11 +31,11 @@ def main(snakemake):
         seed=params.seed,
         truth=truth,
     )
-    base = scene_files.read([inputs.leaves], inputs.wood, params.ground_z_m)[0]
+    base = scene_files.read([inputs.leaves], inputs.wood, around)[0]
     sizes = geometries.polygons(
-        params.polygon_sizes_m, inputs.sized_leaves, inputs.sized_wood, params.ground_z_m
+        params.polygon_sizes_m, inputs.sized_leaves, inputs.sized_wood, around
     ) or [geometries.Geometry("polygons", params.polygon_size_m, lambda: base)]
-    sizes += geometries.voxels(params.voxel_sizes_m, inputs.voxels, base)
+    sizes += geometries.voxels(params.voxel_sizes_m, inputs.voxels, base, around)
     points = grid.points(sizes, params.polygon_size_m)
     tables.write(snakemake.output.points, tradeoff.table(points))
 

@@ -10,10 +10,10 @@ from dapple.workflow import run
 
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
-    scene = scene_files.read([inputs.leaves], inputs.wood, params.ground_z_m)[0]
+    around = scene_files.around(inputs.ground or params.ground_z_m, inputs.shade)
+    scene = scene_files.read([inputs.leaves], inputs.wood, around)[0]
     table = tables.read(inputs.sensors)
-    meshes = {surface.optics: surface.mesh for surface in scene.filled}
-    sensors.check(table, meshes, where=params.sensor_table)
+    sensors.check(table, scene.filled, where=params.sensor_table)
     sensors_m = table[["x_m", "y_m", "z_m"]].to_numpy()
     print(f"variant {params.variant}, {len(sensors_m)} sensors")
     counted = steps.paths(

@@ -43,9 +43,11 @@ def scanned(inputs, params):
 def lighted(found, inputs, params):
     """The same with light and records."""
 
+    around = scene_files.around(inputs.ground or params.ground_z_m, inputs.shade)
+
     def scenes_of(name):
         grid = [path for path in inputs.voxels if Path(path).parent.name == name]
-        scenes = scene_files.read(grid or inputs.leaves, inputs.wood, params.ground_z_m)
+        scenes = scene_files.read(grid or inputs.leaves, inputs.wood, around)
         return (traced.load(scene, params.variant) for scene in scenes)
 
     return with_light(

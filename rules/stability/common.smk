@@ -44,7 +44,7 @@ def stability_setup():
         "time": dict(settings.time),
         "radiation": {"linke_turbidity": settings.radiation.linke_turbidity},
         "atmosphere": SKY["atmosphere"],
-        "ground_z_m": settings.ground_z_m,
+        "ground_z_m": GROUND_Z_M,
         "fill_range_m": settings.corrections.fill_range_m,
         "light": {
             "variant": f"{VARIANT}_rgb",

@@ -20,6 +20,8 @@ if WORSENED:
             ],
             sky=results("sky/sky.nc"),
             sensors=results("sky/sensors.csv"),
+            ground=GROUND,
+            shade=SHADE,
             code=code("stability_records"),
         output:
             records=results("stability/records.csv"),
@@ -36,7 +38,7 @@ if WORSENED:
             reconstructions=WORSENED,
             levels=STABILITY.levels,
             seeds=STABILITY.seeds,
-            ground_z_m=settings.ground_z_m,
+            ground_z_m=GROUND_Z_M,
             variant=f"{VARIANT}_mono",
             sun_diameter_deg=settings.light.sun_diameter_deg,
             aperture_m=settings.light.entrance_m,

@@ -21,6 +21,8 @@ class Finding:
         File, column or key.
     found, expected, remedy : str
         As in `InputError`; a note has no expectation and no remedy.
+    yaml : str
+        Lines of a configuration that mend it, to paste; empty where no key does.
     """
 
     level: Literal["error", "warning", "note"]
@@ -28,20 +30,30 @@ class Finding:
     found: str
     expected: str = ""
     remedy: str = ""
+    yaml: str = ""
 
     def __str__(self) -> str:
         expected = f"; expected {self.expected}" if self.expected else ""
         return f"{self.where}: found {self.found}{expected}. {self.remedy}".strip()
 
 
-def error(where: str | Path, found: str, expected: str, remedy: str) -> Finding:
+def error(where: str | Path, found: str, expected: str, remedy: str, yaml: str = "") -> Finding:
     """What makes results wrong."""
-    return Finding("error", str(where), found, expected, remedy)
+    return Finding("error", str(where), found, expected, remedy, yaml)
 
 
-def warning(where: str | Path, found: str, expected: str = "", remedy: str = "") -> Finding:
+def warning(
+    where: str | Path, found: str, expected: str = "", remedy: str = "", yaml: str = ""
+) -> Finding:
     """What may make results wrong."""
-    return Finding("warning", str(where), found, expected, remedy)
+    return Finding("warning", str(where), found, expected, remedy, yaml)
+
+
+def of(mistake: InputError, yaml: str = "") -> Finding:
+    """A mistake that a reader found, as one finding among others."""
+    return Finding(
+        "error", str(mistake.where), mistake.found, mistake.expected, mistake.remedy, yaml
+    )
 
 
 def note(where: str | Path, found: str) -> Finding:

@@ -72,7 +72,7 @@ def uncompress(laz: str | Path, las: str | Path, program: str = "pdal") -> None:
     run([reader, writer], program)
 
 
-def run(stages: list[dict | str], program: str = "pdal") -> None:
+def run(stages: list[dict | str], program: str = "pdal", *, limit_s: float | None = None) -> None:
     """Run a pipeline.
 
     Parameters
@@ -81,13 +81,16 @@ def run(stages: list[dict | str], program: str = "pdal") -> None:
         As in PDAL's JSON; a bare string is a file to read or write.
     program : str
         PDAL's executable, see `find`.
+    limit_s : float or None
+        PDAL is ended after this time [s].
 
     Raises
     ------
     ProgramError
-        PDAL failed: the message has the command, the exit code and the end of what it printed.
+        PDAL failed or did not end: the message has the command, the exit code and the end of
+        what it printed.
     """
     with tempfile.TemporaryDirectory(prefix="pdal-") as folder:
         pipeline = Path(folder, "pipeline.json")
         pipeline.write_text(json.dumps(stages))
-        programs.run([find(program), "pipeline", pipeline])
+        programs.run([find(program), "pipeline", pipeline], limit_s=limit_s)

@@ -43,7 +43,20 @@ def find(program: str, remedy: str, *, beside: Sequence[Path] = ()) -> str:
     raise InputError(program, "no such program", f"one of {', '.join(candidates)}", remedy)
 
 
-def run(command: Sequence[str | Path], *, environment: dict[str, str] | None = None) -> str:
+def limit_s(n_points: int) -> float:
+    """Time that a program gets for so many points: many times what it takes on a busy machine [s].
+
+    Some searches for neighbours go round in circles where many points share few places.
+    """
+    return 600.0 + 600e-6 * n_points
+
+
+def run(
+    command: Sequence[str | Path],
+    *,
+    environment: dict[str, str] | None = None,
+    limit_s: float | None = None,
+) -> str:
     """Run a command to its end and return its standard output.
 
     Parameters
@@ -52,21 +65,27 @@ def run(command: Sequence[str | Path], *, environment: dict[str, str] | None = N
         Program and arguments; no shell is involved.
     environment : dict, optional
         Variables to set on top of the current environment.
+    limit_s : float or None
+        The program is ended after this time [s].
 
     Raises
     ------
     ProgramError
-        The exit code is not zero.
+        The exit code is not zero, or the time is over.
     """
     words = [str(word) for word in command]
-    done = subprocess.run(
-        words,
-        env=os.environ | (environment or {}),
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        errors="replace",
-    )
+    try:
+        done = subprocess.run(
+            words,
+            env=os.environ | (environment or {}),
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=limit_s,
+        )
+    except subprocess.TimeoutExpired:
+        raise failure(words, f"no end after {limit_s:,.0f} s", "") from None
     if done.returncode:
         raise failure(words, f"exit code {done.returncode}", done.stderr.strip() or done.stdout)
     return done.stdout

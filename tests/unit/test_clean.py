@@ -1,6 +1,7 @@
 """The noise filter: which points go at which step, and what stands for those that stay."""
 
 import json
+import time
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from dapple.cloud.clean import clean, thin
 from dapple.errors import EmptyCloudError, InputError
 from dapple.formats import clouds
 from dapple.formats.clouds import Cloud
+from dapple.formats.ground_surface import flat
 
 ORIGIN_M = np.array([410500.0, 5317080.0, 280.0])
 PROGRAMS = {"cloudcompare": "CloudCompare", "pdal": "pdal"}
@@ -87,7 +89,7 @@ def test_a_cloud_without_reflectance_skips_those_filters_and_says_so():
 def test_points_below_the_given_height_go_and_those_at_it_stay():
     xyz_m = np.stack([np.arange(40) * 0.1, np.zeros(40), np.arange(40) * 0.05], axis=1)
     cloud, counts = clean(
-        Cloud(xyz_m), min_height_m=0.5, ground_z_m=0.25, outlier_backend="none", thin_voxel_m=None
+        Cloud(xyz_m), min_height_m=0.5, ground=flat(0.25), outlier_backend="none", thin_voxel_m=None
     )
     assert counts["after_height"] == 25
     assert cloud.xyz_m[:, 2].min() == pytest.approx(0.75)
@@ -195,3 +197,21 @@ def test_a_failing_pipeline_shows_what_pdal_said(tmp_path):
     clouds.write(tmp_path / "a.laz", Cloud(np.ones((3, 3))))
     with pytest.raises(programs.ProgramError, match=r"exit code 1.*filters\.nonsense"):
         pdal.run([str(tmp_path / "a.laz"), {"type": "filters.nonsense"}])
+
+
+@pytest.mark.parametrize("backend", ["cloudcompare", "pdal"])
+def test_thousands_of_points_at_a_few_places_are_judged_as_places(backend):
+    """A scan written to steps of 10 cm, and 20,000 echoes at one place: in seconds, all kept."""
+    rng = np.random.default_rng(6)
+    xyz_m = np.rint(rng.uniform(0, 1, (8000, 3)) / 0.1) * 0.1
+    stray = np.array([[30.0, 0.0, 0.0]])
+    everything = np.concatenate([xyz_m, np.tile(xyz_m[:1], (20_000, 1)), np.tile(stray, (9, 1))])
+    started = time.process_time()
+    kept, _ = outliers.inliers(everything, backend)
+    assert time.process_time() - started < 5
+    np.testing.assert_array_equal(kept, np.arange(28_000))
+
+
+def test_a_program_that_does_not_end_is_stopped_and_named():
+    with pytest.raises(programs.ProgramError, match=r"sleep 5: found no end after 0 s"):
+        programs.run(["sleep", "5"], limit_s=0.1)

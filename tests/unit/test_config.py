@@ -132,7 +132,12 @@ def test_a_label_that_yaml_takes_for_a_number_asks_for_quotes():
 
 
 REAL_WOOD = {"source": "wood", "measured": {"kind": "none"}, "reconstructions": ["polygons"]}
+UNKNOWN_SHOTS = REAL_CLOUD | {"cloud": {"path": "tree.laz", "shots": "none"}}
 CONTRADICTIONS = {
+    "tree": [
+        (REAL_CLOUD | {"tree": {"id": 1, "at": [0.0, 0.0]}}, "tree.id: 1"),
+        ({"tree": {"id": 1}}, "source: virtual"),
+    ],
     "reconstructions": [
         ({"reconstructions": ["voxels_0.3"]}, "voxels_0.3"),
         ({"reconstructions": ["polygons", "truth", "polygons"]}, "polygons"),
@@ -147,10 +152,11 @@ CONTRADICTIONS = {
     ],
     "misses": [
         (REAL_CLOUD | {"cloud": {"path": "tree.laz", "shots": "recorded"}}, "tree.laz"),
-        (REAL_CLOUD | {"reconstructions": ["voxels_0.2"]}, "voxels_0.2"),
+        (UNKNOWN_SHOTS | {"reconstructions": ["voxels_0.2"]}, "voxels_0.2"),
+        (REAL_CLOUD | {"cloud": {"path": "tree.laz", "shots": "positions"}}, "scan_positions"),
     ],
     "corrections": [
-        (REAL_CLOUD | {"corrections": {"clumping": True}}, "corrections.clumping"),
+        (UNKNOWN_SHOTS | {"corrections": {"clumping": True}}, "corrections.clumping"),
         (
             REAL_WOOD | {"wood_path": "bark.obj", "corrections": {"occlusion": True}},
             "corrections.occlusion",
@@ -283,14 +289,14 @@ def test_a_time_that_is_none_is_refused_wherever_one_is_asked_for():
 
 
 def test_density_from_a_cloud_that_keeps_no_misses_stops_before_anything_runs():
-    config = REAL_CLOUD | {"reconstructions": ["polygons", "voxels_0.2"]}
+    config = UNKNOWN_SHOTS | {"reconstructions": ["polygons", "voxels_0.2"]}
     with pytest.raises(MissingMissesError) as error:
         validate(config)
     assert "voxels_0.2" in error.value.found
     assert "tree.laz" in error.value.expected
-    assert "scan_frame" in error.value.remedy
-    allowed = {"cloud": {"path": "tree.laz", "shots": "scan_frame"}}
-    assert validate(config | allowed).cloud.shots == "scan_frame"
+    assert "auto" in error.value.remedy
+    allowed = {"cloud": {"path": "tree.laz", "shots": "auto"}}
+    assert validate(config | allowed).has_shots
 
 
 @pytest.mark.parametrize("section", ["site", "time", "radiation"])

@@ -2,8 +2,10 @@ import numpy as np
 import pytest
 
 from dapple.errors import InputError
+from dapple.formats.ground_surface import flat
 from dapple.formats.meshes import Mesh
 from dapple.scene import sensors
+from dapple.scene.surfaces import of_kinds
 
 
 def leaf(z_m=2.0, side_m=0.05):
@@ -66,7 +68,7 @@ def test_a_missing_table_is_refused(tmp_path):
 
 def test_a_grid_is_centred_where_it_should_be():
     grid = sensors.grid_around(
-        (0.1, 0.25), columns=5, rows=2, spacing_m=0.5, height_m=0.1, ground_z_m=3.0
+        (0.1, 0.25), columns=5, rows=2, spacing_m=0.5, height_m=0.1, ground=flat(3.0)
     )
     assert len(grid) == 5 * 2
     assert sorted(set(grid["x_m"].round(6))) == [-0.9, -0.4, 0.1, 0.6, 1.1]
@@ -107,23 +109,25 @@ def test_distances_agree_with_a_dense_sampling_of_the_triangles():
 
 
 def test_a_sensor_under_a_leaf_is_fine_and_one_inside_it_is_named_with_its_distance():
-    sensors.check(at(0.02, 0.02, 1.9), {"leaf": leaf()})
+    sensors.check(at(0.02, 0.02, 1.9), of_kinds(leaf=leaf()))
     with pytest.raises(InputError, match=r"sensor 1_1 3\.0 mm from leaf"):
-        sensors.check(at(0.02, 0.02, 1.997), {"leaf": leaf()})
+        sensors.check(at(0.02, 0.02, 1.997), of_kinds(leaf=leaf()))
     with pytest.raises(InputError, match="from wood"):
-        sensors.check(at(0.02, 0.02, 2.0), {"leaf": leaf(5.0), "wood": leaf()})
+        sensors.check(at(0.02, 0.02, 2.0), of_kinds(leaf=leaf(5.0), wood=leaf()))
 
 
 def test_a_sensor_far_outside_the_scene_is_named_with_its_distance():
     with pytest.raises(InputError, match=r"sensor 1_1 at .*, 99\.9 m outside the scene"):
-        sensors.check(at(99.95, 0.0, 2.0), {"leaf": leaf()})
-    sensors.check(at(99.95, 0.0, 2.0), {"leaf": leaf()}, bounds_m=np.array([[0, 0, 0], [90, 9, 9]]))
+        sensors.check(at(99.95, 0.0, 2.0), of_kinds(leaf=leaf()))
+    sensors.check(
+        at(99.95, 0.0, 2.0), of_kinds(leaf=leaf()), bounds_m=np.array([[0, 0, 0], [90, 9, 9]])
+    )
 
 
 def test_a_sensor_below_the_ground_is_refused():
     with pytest.raises(InputError, match=r"0\.100 m below the ground"):
-        sensors.check(at(0.0, 0.0, 0.4), {"leaf": leaf()}, ground_z_m=0.5)
+        sensors.check(at(0.0, 0.0, 0.4), of_kinds(leaf=leaf()), ground=flat(0.5))
 
 
 def test_an_open_field_takes_sensors_anywhere():
-    sensors.check(at(500.0, 0.0, 1.0), {})
+    sensors.check(at(500.0, 0.0, 1.0))

@@ -72,7 +72,7 @@ def test_density_without_misses_says_so_and_not_that_an_input_is_missing(project
     clouds.write(project.folder / "tree.laz", some_cloud(**reflectance()))
     config = {"cloud": {"path": "tree.laz"}, "reconstructions": ["voxels_0.2"]}
     said, output = stopped(project, config, "results/mine/structure/voxels_0.2/voxels.nc")
-    assert "cloud.shots: none" in said
+    assert "no shot that met nothing" in said
     assert "no denominator" in said
     assert "MissingInputException" not in output
 
@@ -113,7 +113,9 @@ def _text(value):
 
 def ingest(tmp_path, path, required=("Reflectance",)):
     params = {"shots": "none", "scan_frame": {}, "required": list(required)}
-    job = rule(tmp_path, {"cloud": path, "positions": ""}, {"points": "points.laz"}, params)
+    params |= {"unit": "auto", "up": "z"}
+    outputs = {"points": "points.laz", "frame": "frame.json"}
+    job = rule(tmp_path, {"cloud": path, "positions": ""}, outputs, params)
     script("ingest").main(job)
     return clouds.read(job.output.points)
 
@@ -193,14 +195,14 @@ def test_a_sensor_where_none_can_be_is_named_with_its_table(tmp_path, position, 
         meshes.write_ply(tmp_path / name, LEAF)
     placed = rule(
         tmp_path,
-        {"table": table, "registration": "", "wood": ""},
+        {"table": table, "frame": "", "wood": "", "ground": ""},
         {"sensors": "local.csv"},
         SENSORS,
     )
     traced = rule(
         tmp_path,
         {name: tmp_path / f"{name}.ply" for name in ("leaves", "wood")}
-        | {"sensors": placed.output.sensors},
+        | {"sensors": placed.output.sensors, "ground": "", "shade": ""},
         {"transport": "transport.nc"},
         {"ground_z_m": 0.0, "sensor_table": str(table)},
     )

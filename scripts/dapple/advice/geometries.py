@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from dapple.formats import voxel_grids
 from dapple.scene import scene_files
+from dapple.scene.scene_files import Around
 from dapple.scene.surfaces import WOOD, Scene
 
 
@@ -27,22 +28,25 @@ class Geometry:
 
 
 def polygons(
-    sizes_m: Sequence[float], leaves: Sequence[str], wood: Sequence[str], ground_z_m: float
+    sizes_m: Sequence[float], leaves: Sequence[str], wood: Sequence[str], around: Around
 ) -> list[Geometry]:
     """Polygons of all sizes of which there are files."""
 
     def load(one: str, branches: str) -> Callable[[], Scene]:
-        return lambda: scene_files.read([one], branches, ground_z_m)[0]
+        return lambda: scene_files.read([one], branches, around)[0]
 
     files = zip(sizes_m, leaves, wood, strict=False)
     return [Geometry("polygons", size_m, load(*paths)) for size_m, *paths in files]
 
 
-def voxels(sizes_m: Sequence[float], grids: Sequence[str], base: Scene) -> list[Geometry]:
+def voxels(
+    sizes_m: Sequence[float], grids: Sequence[str], base: Scene, around: Around
+) -> list[Geometry]:
     """Turbid voxels of all sizes of which there are files, around the wood of a scene."""
+    surfaces = (*base.of(WOOD), *around.surfaces)
 
     def load(path: str) -> Callable[[], Scene]:
-        return lambda: Scene(base.of(WOOD), voxel_grids.read(path), base.ground_z_m)
+        return lambda: Scene(surfaces, voxel_grids.read(path), base.ground_z_m)
 
     files = zip(sizes_m, grids, strict=False)
     return [Geometry("voxels", size_m, load(path)) for size_m, path in files]

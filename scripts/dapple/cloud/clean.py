@@ -9,8 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from dapple.cloud import outliers, voxel_groups
+from dapple.cloud.ground_finder import GROUND_CLASS
 from dapple.errors import EmptyCloudError
+from dapple.formats import ground_surface
 from dapple.formats.clouds import Cloud
+from dapple.formats.ground_surface import GroundSurface
 
 CATEGORIES = frozenset(
     [
@@ -47,7 +50,7 @@ def clean(
     outlier_multiplier: float = 3.0,
     thin_voxel_m: float | None = 0.01,
     min_height_m: float | None = None,
-    ground_z_m: float = 0.0,
+    ground: GroundSurface | None = None,
     pdal: str = "pdal",
     cloudcompare: str = "CloudCompare",
     where: str | Path = "cloud",
@@ -67,9 +70,10 @@ def clean(
     thin_voxel_m : float or None
         Edge of the voxels that keep one point each [m], see `thin`; None skips the step.
     min_height_m : float or None
-        Points lower than this above flat ground go [m]; None keeps them all.
-    ground_z_m : float
-        Height of the ground in the local frame [m].
+        Points lower than this above the ground go, and those of class 2 (ground); None keeps them
+        all [m].
+    ground : GroundSurface or None
+        None: flat ground at 0.
     where : str or Path
         The file to name in errors.
 
@@ -94,9 +98,8 @@ def clean(
     skipped: list[str] = []
     counts = {"input": len(cloud)}
     kept = np.ones(len(cloud), bool)
-    lowest_m = -np.inf if min_height_m is None else ground_z_m + min_height_m
     for step, chosen in (
-        ("height", cloud.xyz_m[:, 2] >= lowest_m),
+        ("height", _above(cloud, ground or ground_surface.flat(0.0), min_height_m)),
         ("reflectance", _within(cloud, "Reflectance", np.greater, min_reflectance_db, skipped)),
         ("deviation", _within(cloud, "Deviation", np.less, max_deviation, skipped)),
     ):
@@ -122,6 +125,16 @@ def clean(
     counts["after_thinning"] = len(cloud)
     facts = {"skipped": skipped, "outlier_backend": outlier_backend, "versions": versions}
     return cloud, counts | facts
+
+
+def _above(cloud: Cloud, ground: GroundSurface, min_height_m: float | None) -> np.ndarray | bool:
+    """(n,) bool, points that stand on the ground and are no part of it."""
+    if min_height_m is None:
+        return True
+    high = cloud.xyz_m[:, 2] >= ground.height_m(cloud.xyz_m[:, :2]) + min_height_m
+    if "Classification" in cloud.attributes:
+        high &= cloud.attributes["Classification"] != GROUND_CLASS
+    return high
 
 
 def _within(

@@ -73,7 +73,10 @@ class CommandLine:
             given, kept = Path(folder, "given.ply"), Path(folder, "kept.ply")
             write_points(given, xyz_m - _middle(xyz_m))
             # CloudCompare counts the point itself among its neighbours, hence the + 1.
-            self._run([given], ["-SOR", str(neighbours + 1), repr(float(multiplier))], kept)
+            limit_s = programs.limit_s(len(xyz_m))
+            self._run(
+                [given], ["-SOR", str(neighbours + 1), repr(float(multiplier))], kept, limit_s
+            )
             return _rows(*_columns(self._read(kept), ("scalar_RowHigh", "scalar_RowLow")))
 
     def distance_to_mesh(self, xyz_m: np.ndarray, mesh: Mesh) -> np.ndarray:
@@ -84,7 +87,8 @@ class CommandLine:
             points_m, vertices_m = _tilted(xyz_m, mesh.vertices_m)
             write_points(given, points_m)
             write_mesh(surface, vertices_m, mesh.faces)
-            self._run([given, surface], ["-C2M_DIST"], result)
+            limit_s = programs.limit_s(len(xyz_m))
+            self._run([given, surface], ["-C2M_DIST"], result, limit_s)
             points = self._read(result)
         field = next(name for name in points.dtype.names if name.startswith("scalar_C2M"))
         distance_m = np.empty(len(xyz_m))
@@ -92,13 +96,15 @@ class CommandLine:
         distance_m[rows] = np.abs(points[field])  # signed where triangles have a front side
         return distance_m
 
-    def _run(self, opened: list[Path], action: list[str], saved: Path) -> None:
+    def _run(self, opened: list[Path], action: list[str], saved: Path, limit_s: float) -> None:
         command = [self.program, "-SILENT", "-AUTO_SAVE", "OFF", "-NO_TIMESTAMP"]
         command += ["-C_EXPORT_FMT", "PLY", "-PLY_EXPORT_FMT", "BINARY_LE"]
         for path in opened:
             command += ["-O", "-GLOBAL_SHIFT", "AUTO", str(path)]
         command += [*action, "-SAVE_CLOUDS", "FILE", str(saved)]
-        printed = programs.run(command, environment={"QT_QPA_PLATFORM": "offscreen"})
+        printed = programs.run(
+            command, environment={"QT_QPA_PLATFORM": "offscreen"}, limit_s=limit_s
+        )
         if not saved.is_file():
             raise programs.failure(command, "no output file", printed)
 

@@ -4,12 +4,16 @@ import CSF
 import numpy as np
 from scipy import ndimage
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+from threadpoolctl import threadpool_limits
 
 from dapple.cloud.selection import without_marked
 from dapple.errors import EmptyCloudError, InputError
 from dapple.formats.clouds import Cloud
 from dapple.formats.rasters import Raster
 from dapple.programs import silenced
+
+MOST_CELLS = 50_000_000
+"""A table of more columns than this is not made."""
 
 
 def isolated(xyz_m: np.ndarray, *, cell_m: float, most_points: int) -> np.ndarray:
@@ -47,9 +51,13 @@ def lowest(xyz_m: np.ndarray, *, cell_m: float) -> np.ndarray:
     """Indices of the lowest point of every column of ground area `cell_m`², ascending."""
     cell = np.floor((xyz_m[:, :2] - xyz_m[:, :2].min(axis=0)) / cell_m).astype(np.int64)
     key = cell[:, 0] * (cell[:, 1].max() + 1) + cell[:, 1]
-    order = np.lexsort((xyz_m[:, 2], key))
-    first = np.flatnonzero(np.diff(key[order], prepend=-1))
-    return np.sort(order[first])
+    if key.max() > MOST_CELLS:
+        key = np.unique(key, return_inverse=True)[1]
+    least = np.full(key.max() + 1, np.inf)
+    np.minimum.at(least, key, xyz_m[:, 2])
+    candidates = np.flatnonzero(xyz_m[:, 2] == least[key])
+    _, first = np.unique(key[candidates], return_index=True)
+    return np.sort(candidates[first])
 
 
 def cloth(
@@ -58,6 +66,7 @@ def cloth(
     cloth_m: float,
     rigidness: int,
     threshold_m: float,
+    least_share: float = 0.1,
     where: str = "points",
 ) -> np.ndarray:
     """Mark ground points: those near a cloth that falls on the cloud turned upside down.
@@ -72,6 +81,8 @@ def cloth(
         1 steep slopes, 2 hills, 3 flat land.
     threshold_m : float
         Points at most so far from the cloth are ground [m].
+    least_share : float
+        Share of the area that has to have ground.
     where : str
         File to name in errors.
 
@@ -84,7 +95,7 @@ def cloth(
     EmptyCloudError
         No point.
     InputError
-        Ground under less than a tenth of the area: the cloud holds canopy alone.
+        Ground under a smaller share of the area: the cloud holds canopy alone.
 
     Notes
     -----
@@ -100,12 +111,13 @@ def cloth(
     filter_.params.class_threshold = threshold_m
     filter_.setPointCloud(np.ascontiguousarray(xyz_m, np.float64))
     ground, above = CSF.VecInt(), CSF.VecInt()
-    with silenced(1):
+    # Threads of the library wait by computing: on a busy machine one is faster than two.
+    with silenced(1), threadpool_limits(1, "openmp"):
         filter_.do_filtering(ground, above, False)
     mask = np.zeros(len(xyz_m), bool)
     mask[np.asarray(ground, dtype=np.int64)] = True
-    share = _covered(xyz_m, mask, 4 * cloth_m)
-    if share < 0.1:
+    share = covered_share(xyz_m, mask, 4 * cloth_m)
+    if share < least_share:
         raise InputError(
             where,
             f"ground under {100 * share:.0f} % of the area",
@@ -116,7 +128,7 @@ def cloth(
     return mask
 
 
-def _covered(xyz_m: np.ndarray, mask: np.ndarray, cell_m: float) -> float:
+def covered_share(xyz_m: np.ndarray, mask: np.ndarray, cell_m: float) -> float:
     """Share of the occupied cells that hold a marked point."""
     cell = np.floor((xyz_m[:, :2] - xyz_m[:, :2].min(axis=0)) / cell_m).astype(np.int64)
     key = cell[:, 0] * (cell[:, 1].max() + 1) + cell[:, 1]

@@ -7,7 +7,9 @@ import laspy
 import numpy as np
 
 from dapple import pdal as pdal_program
+from dapple import programs
 from dapple.cloud import cloudcompare as cc
+from dapple.cloud.selection import duplicates
 from dapple.errors import InputError
 
 BACKENDS = ("cloudcompare", "pdal", "none")
@@ -41,7 +43,9 @@ def inliers(
     Returns
     -------
     (k,) int64
-        Ascending indices of the points that stay.
+        Ascending indices of the points that stay. Points at exactly one place count once, and
+        share what is found of it: neighbours at no distance would make any other place an
+        outlier, and searches among thousands of them do not end.
     dict of str to str
         Version of the program used, by its name.
 
@@ -58,22 +62,38 @@ def inliers(
     precision and divides the variance by n, PDAL uses double precision and n - 1, so that a point
     within about 1e-6 of the limit may be judged differently.
     """
-    match backend:
-        case "none":
-            return np.arange(len(xyz_m)), {}
-        case "pdal":
-            kept = _by_pdal(xyz_m, neighbours, multiplier, pdal)
-            return kept, {"pdal": pdal_program.version(pdal)}
-        case "cloudcompare":
-            engine = cc.engine(cloudcompare)
-            kept = engine.inliers(xyz_m, neighbours, multiplier)
-            return kept, {engine.name: engine.version}
-    raise InputError(
-        "clean.outlier_backend",
-        repr(backend),
-        f"one of {', '.join(BACKENDS)}",
-        "Change the configuration.",
-    )
+    if backend not in BACKENDS:
+        raise InputError(
+            "clean.outlier_backend",
+            repr(backend),
+            f"one of {', '.join(BACKENDS)}",
+            "Change the configuration.",
+        )
+    place_of_point, once = _places(xyz_m)
+    if backend == "none" or len(once) <= neighbours:
+        return np.arange(len(xyz_m)), {}
+    if backend == "pdal":
+        kept = _by_pdal(once, neighbours, multiplier, pdal)
+        versions = {"pdal": pdal_program.version(pdal)}
+    else:
+        engine = cc.engine(cloudcompare)
+        kept = engine.inliers(once, neighbours, multiplier)
+        versions = {engine.name: engine.version}
+    stays = np.zeros(len(once), bool)
+    stays[kept] = True
+    return np.flatnonzero(stays[place_of_point]), versions
+
+
+def _places(xyz_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The place of every point, and the places themselves in the order of their first points."""
+    again = duplicates(xyz_m)
+    if not again.any():
+        return np.arange(len(xyz_m)), xyz_m
+    _, first, place = np.unique(xyz_m, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty(len(first), np.int64)
+    rank[order] = np.arange(len(first))
+    return rank[place.ravel()], xyz_m[first[order]]
 
 
 def _by_pdal(xyz_m: np.ndarray, neighbours: int, multiplier: float, program: str) -> np.ndarray:
@@ -88,5 +108,9 @@ def _by_pdal(xyz_m: np.ndarray, neighbours: int, multiplier: float, program: str
         given, kept = Path(folder, "given.las"), Path(folder, "kept.las")
         points.write(given)
         stages = pdal_program.remove_outliers(neighbours, multiplier)
-        pdal_program.run([str(given), *stages, pdal_program.write_las(kept)], program)
+        pdal_program.run(
+            [str(given), *stages, pdal_program.write_las(kept)],
+            program,
+            limit_s=programs.limit_s(len(xyz_m)),
+        )
         return np.sort(laspy.read(kept)["Row"].astype(np.int64))

@@ -5,10 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
+from dapple import frames
 from dapple.errors import EmptyCloudError, InputError
-from dapple.formats.cloud_raw import KNOWN_NAMES, Source
+from dapple.formats.cloud_raw import KNOWN_NAMES, Source, Units
 from dapple.formats.clouds import Cloud
 
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "us-ft": 1200 / 3937}
 NOISE_CLASSES = (7, 18)
 """ASPRS: low and high noise."""
 
@@ -20,7 +22,9 @@ WHOLE = {*LIMITS, "Intensity", "PointSourceId"}
 """Attributes that LAS holds as whole numbers, up to 65,535 where LIMITS has no less."""
 
 
-def take(cloud: Cloud, source: Source, path: str | Path) -> tuple[Cloud, Source]:
+def take(
+    cloud: Cloud, source: Source, path: str | Path, *, unit: str = "auto", up: str = "z"
+) -> tuple[Cloud, Source]:
     """The points of a file that the chain works on.
 
     Points that the file itself calls noise, withheld or synthetic are left out. Coordinates in
@@ -35,11 +39,15 @@ def take(cloud: Cloud, source: Source, path: str | Path) -> tuple[Cloud, Source]
         What the file says of itself.
     path : str or Path
         To name in errors.
+    unit : str
+        Of the coordinates, one of `UNITS`; "auto": as the file says, else metres.
+    up : {"z", "y", "-z"}
+        Axis of the file that points up.
 
     Returns
     -------
     cloud : Cloud
-        In metres.
+        In metres, x east, y north, z up.
     source : Source
         With counts and notes of what was left out and changed.
 
@@ -50,7 +58,10 @@ def take(cloud: Cloud, source: Source, path: str | Path) -> tuple[Cloud, Source]
     EmptyCloudError
         Nothing but noise.
     """
+    if unit != "auto":
+        source = replace(source, units=Units(UNITS[unit], UNITS[unit]))
     cloud, source = in_metres(cloud, source, path)
+    cloud = turned_up(cloud, up)
     cloud, left_out = without_marked(cloud, path)
     attributes, notes = storable(cloud.attributes)
     return (
@@ -96,6 +107,16 @@ def in_metres(cloud: Cloud, source: Source, path: str | Path) -> tuple[Cloud, So
     )
     changed = Cloud(cloud.xyz_m * factor, cloud.origin_m * factor, cloud.attributes)
     return changed, replace(source, step=step, scans=scans, notes=(*source.notes, note))
+
+
+def turned_up(cloud: Cloud, up: str) -> Cloud:
+    """The cloud turned about x so that an axis of its world points up."""
+    if up == "z":
+        return cloud
+    x, y, z = cloud.world_xyz_m.T
+    world = np.stack({"y": (x, -z, y), "-z": (x, -y, -z)}[up], axis=1)
+    origin = frames.choose_origin(world)
+    return Cloud(frames.to_local(world, origin), origin, cloud.attributes)
 
 
 def without_marked(cloud: Cloud, path: str | Path) -> tuple[Cloud, dict[str, int]]:

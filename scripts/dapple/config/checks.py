@@ -97,15 +97,42 @@ def misses(settings: Settings, where: str) -> None:
             f"`reconstructions: {wanted[0]}` and `cloud.shots: none`",
             f"the shots of {cloud.path} that met nothing: plant area density has no denominator "
             "without them",
-            "Set cloud.shots to `recorded` (ptx keeps misses) or, for the regular frame of a "
-            "single scan, to `scan_frame`; or leave voxels out of the reconstructions.",
+            "Set cloud.shots to `auto`, or leave voxels out of the reconstructions.",
         )
-    if cloud.shots == "recorded" and PurePath(cloud.path).suffix.lower() != ".ptx":
+    keepers = (".ptx", ".e57", ".ply", ".txt", ".xyz", ".csv")
+    if cloud.shots == "recorded" and PurePath(cloud.path).suffix.lower() not in keepers:
         raise InputError(
             where,
             f"`cloud.shots: recorded` and `cloud.path: {cloud.path}`",
-            "a ptx file: other formats keep no misses",
-            "Export the scan as ptx, or set cloud.shots to `scan_frame` or `none`.",
+            "PTX, a structured E57, a ray cloud (PLY) or a table of shots: other formats keep no "
+            "misses",
+            "Export the scan as one of these, or set cloud.shots to `auto`.",
+        )
+    if cloud.shots == "positions" and not cloud.scan_positions:
+        raise InputError(
+            where,
+            "`cloud.shots: positions` and no `cloud.scan_positions`",
+            "a table of the places where the scanner stood",
+            "Set `cloud.scan_positions`.",
+        )
+
+
+def tree(settings: Settings, where: str) -> None:
+    """A tree is chosen in one way, out of a cloud."""
+    chosen = settings.tree
+    if chosen.id is not None and chosen.at is not None:
+        raise InputError(
+            where,
+            f"`tree.id: {chosen.id}` and `tree.at: {list(chosen.at)}`",
+            "one of them",
+            "Leave one out.",
+        )
+    if settings.source != "cloud" and (chosen.id is not None or chosen.at is not None):
+        raise InputError(
+            where,
+            f"`tree` and `source: {settings.source}`",
+            "`source: cloud`: a virtual tree stands alone",
+            "Leave the section out.",
         )
 
 
@@ -117,7 +144,7 @@ def corrections(settings: Settings, where: str) -> None:
             where,
             f"`corrections.{wanted[0]}: true` and `cloud.shots: none`",
             "shots, from which coverage is known",
-            "Set cloud.shots to `recorded` or `scan_frame`, or turn the correction off.",
+            "Set cloud.shots to `auto`, or turn the correction off.",
         )
     if settings.corrections.occlusion and settings.source == "wood":
         raise InputError(
@@ -359,6 +386,7 @@ def stability(settings: Settings, where: str) -> None:
 
 
 CHECKS = (
+    tree,
     reconstructions,
     paths,
     misses,

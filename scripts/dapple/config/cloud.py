@@ -11,9 +11,15 @@ class CloudInput(Section):
     """A real point cloud (`source: cloud`)."""
 
     path: str = key("", "point cloud (las, laz, ply, e57, ptx, txt), relative to data_dir")
+    unit: Literal["auto", "m", "cm", "mm", "ft", "us-ft"] = key(
+        "auto", "of its coordinates; auto: as its coordinate system or header has it, else metres"
+    )
+    up: Literal["z", "y", "-z"] = key("z", "axis of the file that points up")
     scan_positions: str = key(
         "", "CSV of scan positions: position, x, y, z in the cloud's coordinates"
     )
-    shots: Literal["none", "recorded", "scan_frame"] = key(
-        "none", "misses: not known, recorded in the file (ptx), or rebuilt from scan_frame"
+    shots: Literal["auto", "none", "recorded", "scan_frame", "positions"] = key(
+        "auto",
+        "misses: recorded in the file, rebuilt from scan_frame or from a frame found for each of "
+        "scan_positions, or not known; auto: as the file and the tables allow",
     )

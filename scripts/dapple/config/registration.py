@@ -11,7 +11,10 @@ class Registration(Section):
     """Origin of the tree's frame and offset of the loggers' clock."""
 
     fit: bool = key(False, "fit them on a part of the records and report on the rest")
-    origin_m: tuple[float, float, float] = key((0.0, 0.0, 0.0), "origin, or first guess of it")
+    origin_m: tuple[float, float, float] | None = key(
+        None,
+        "origin of a frame that is unknown, or first guess of it; none: the cloud's own, else 0",
+    )
     max_shift_m: NotNegative = key(0.4, "largest shift that is tried, east and north")
     max_clock_offset_s: NotNegative = key(
         60.0,

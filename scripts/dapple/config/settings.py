@@ -39,6 +39,7 @@ from dapple.config.survey import Survey
 from dapple.config.time import Time
 from dapple.config.tools import Tools
 from dapple.config.tradeoff import Tradeoff
+from dapple.config.tree import Tree
 from dapple.config.voxels import Voxels
 
 
@@ -60,7 +61,9 @@ class Settings(Section):
     reconstructions: Some[str] = key(
         ("polygons", "voxels_0.2", "voxels_1.0", "truth"), "what light is computed for"
     )
-    ground_z_m: float = key(0.0, "height of the flat ground in the tree's frame")
+    ground_z_m: float | None = key(
+        None, "height of flat ground; none: found in the cloud, else 0 of the tree's frame"
+    )
     wood_path: str = key(
         "", "OBJ of wood polygons in LESS axes (source: wood), relative to data_dir"
     )
@@ -68,6 +71,7 @@ class Settings(Section):
     leaves: Leaves = Leaves()
     scan: Scan = Scan()
     cloud: CloudInput = CloudInput()
+    tree: Tree = Tree()
     scan_frame: ScanFrame = ScanFrame()
     clean: Clean = Clean()
     classify: Classify = Classify()
@@ -90,6 +94,18 @@ class Settings(Section):
     chlorophyll: Chlorophyll = Chlorophyll()
     stability: Stability = Stability()
     tools: Tools = Tools()
+
+    @property
+    def has_shots(self) -> bool:
+        """Whether the run makes shots: always of a virtual scan; of a cloud where they are known.
+
+        `cloud.shots: auto` makes them where something asks for them, or the format always has them.
+        """
+        if self.source != "cloud" or self.cloud.shots != "auto":
+            return self.source != "cloud" or self.cloud.shots != "none"
+        asked = any(name.startswith("voxels_") for name in self.reconstructions)
+        asked = asked or self.corrections.occlusion or self.corrections.clumping
+        return asked or self.cloud.path.lower().endswith(".ptx")
 
 
 def validate(config: dict[str, Any], where: str = "configuration") -> Settings:

@@ -39,7 +39,7 @@ def read(path: Path) -> RawCloud:
         facts.append(ScanFacts(number, scan.position_m, len(world), int(np.prod(scan.shape))))
     shots = sum(scan.shots or 0 for scan in facts)
     points = sum(scan.points for scan in facts)
-    source = Source(points, left_out={"shot that met nothing": shots - points}, scans=tuple(facts))
+    source = Source(shots, left_out={"shot that met nothing": shots - points}, scans=tuple(facts))
     if not pieces:
         return RawCloud(np.empty((0, 3)), source=source)
     attributes = joined(pieces)

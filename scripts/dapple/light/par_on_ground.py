@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from dapple.formats.ground_surface import GroundSurface
 from dapple.formats.netcdf import time_coordinate, times
 from dapple.light.timestep_series import Reference
 from dapple.scene.scene_optics import Optics
@@ -18,6 +19,7 @@ LIFT_M = 0.01
 
 def par_on_ground(
     scene: Scene,
+    ground: GroundSurface,
     sky: xr.Dataset,
     optics: Optics,
     *,
@@ -31,6 +33,8 @@ def par_on_ground(
     Parameters
     ----------
     scene : Scene
+    ground : GroundSurface
+        On which the points lie.
     sky : Dataset
         Sun and sky at the times of the maps.
     optics : Optics
@@ -50,7 +54,7 @@ def par_on_ground(
         np.arange(low[k] - margin_m, high[k] + margin_m, spacing_m) + spacing_m / 2 for k in (0, 1)
     )
     north, east = np.meshgrid(y, x, indexing="ij")
-    level = np.full(east.size, scene.ground_z_m + LIFT_M)
+    level = ground.height_m(np.column_stack([east.ravel(), north.ravel()])) + LIFT_M
     points = pd.DataFrame({"x_m": east.ravel(), "y_m": north.ravel(), "z_m": level})
     points.insert(0, "sensor", [f"g{k}" for k in range(len(points))])
     of_time = Reference([scene], sky, optics, **engine, seed=seed)

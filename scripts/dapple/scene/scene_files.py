@@ -1,13 +1,60 @@
 """Scenes from the files of a reconstruction."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from dapple.formats import meshes, voxel_grids
-from dapple.scene.surfaces import Scene, of_kinds
+from dapple.formats import ground_surface, meshes, voxel_grids
+from dapple.formats.ground_surface import GroundSurface
+from dapple.scene.surfaces import GROUND, LEAF, Scene, Surface, of_kinds
+
+MOST_NODES = 120
+"""Of terrain along an edge: light under a tree does not tell finer ground apart."""
 
 
-def read(leaves: Sequence[str], wood: str, ground_z_m: float = 0.0) -> list[Scene]:
+@dataclass(frozen=True)
+class Around:
+    """What stands around a tree.
+
+    Attributes
+    ----------
+    ground : GroundSurface
+    surfaces : tuple of Surface
+        Terrain where the ground is not flat, and neighbours, which are taken for leaves.
+    ground_z_m : float
+        Height of the flat ground below it all [m].
+    """
+
+    ground: GroundSurface
+    surfaces: tuple[Surface, ...]
+    ground_z_m: float
+
+
+LEVEL = Around(ground_surface.flat(0.0), (), 0.0)
+
+
+def around(ground: str | float, shade: str = "") -> Around:
+    """What stands around a tree.
+
+    Parameters
+    ----------
+    ground : path or float
+        Surface of the ground, or the height of flat ground [m].
+    shade : path
+        PLY mesh of neighbours; empty: the tree stands alone.
+    """
+    found = ground_surface.read(ground) if isinstance(ground, str) else ground_surface.flat(ground)
+    surfaces, lowest_m = [], found.lowest_m
+    if not found.is_flat:
+        terrain = found.mesh(MOST_NODES)
+        lowest_m = float(terrain.vertices_m[:, 2].min())
+        surfaces.append(Surface(terrain, GROUND, is_leaf=False))
+    if shade:
+        surfaces.append(Surface(meshes.read_ply(shade), LEAF))
+    return Around(found, tuple(surfaces), lowest_m)
+
+
+def read(leaves: Sequence[str], wood: str, beside: Around = LEVEL) -> list[Scene]:
     """Put together what light meets, once for every placement of the leaves.
 
     Parameters
@@ -16,17 +63,17 @@ def read(leaves: Sequence[str], wood: str, ground_z_m: float = 0.0) -> list[Scen
         PLY meshes, one a placement, or a NetCDF voxel grid.
     wood : path
         PLY mesh.
-    ground_z_m : float
-        Height of the ground [m].
+    beside : Around
+        Ground and neighbours.
     """
     branches = meshes.read_ply(wood)
     scenes = []
     for path in map(Path, leaves):
         if path.suffix == ".nc":
-            scenes.append(Scene(of_kinds(wood=branches), voxel_grids.read(path), ground_z_m))
+            surfaces, voxels = of_kinds(wood=branches), voxel_grids.read(path)
         else:
-            surfaces = of_kinds(leaf=meshes.read_ply(path), wood=branches)
-            scenes.append(Scene(surfaces, None, ground_z_m))
+            surfaces, voxels = of_kinds(leaf=meshes.read_ply(path), wood=branches), None
+        scenes.append(Scene((*surfaces, *beside.surfaces), voxels, beside.ground_z_m))
     return scenes
 
 

@@ -1,6 +1,6 @@
 """Where the light is measured: horizontal PAR sensors."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +8,10 @@ import pandas as pd
 from scipy.spatial import cKDTree
 
 from dapple.errors import InputError
-from dapple.formats import user_tables
+from dapple.formats import ground_surface, user_tables
+from dapple.formats.ground_surface import GroundSurface
 from dapple.formats.meshes import Mesh
+from dapple.scene.surfaces import GROUND, Surface
 
 COLUMN_NAMES = {
     "sensor": ("sensor", "label"),
@@ -18,6 +20,8 @@ COLUMN_NAMES = {
     "z_m": ("z_m", "z", "up"),
 }
 POSITION = ["x_m", "y_m", "z_m"]
+DEEPEST_M, LIFT_M = 0.15, 0.01
+"""So far below the ground a sensor still lies on it, and so far above it is laid then."""
 
 
 def read(
@@ -98,7 +102,7 @@ def grid_around(
     rows: int,
     spacing_m: float,
     height_m: float,
-    ground_z_m: float = 0.0,
+    ground: GroundSurface | None = None,
 ) -> pd.DataFrame:
     """Place a grid of sensors around a point.
 
@@ -108,33 +112,32 @@ def grid_around(
         East and north of its middle in the local frame [m].
     columns, rows : int
         Number of sensors from west to east and from south to north.
-    spacing_m, height_m, ground_z_m : float
-        As in `grid`.
+    spacing_m, height_m : float
+        Between neighbours, and above the ground [m].
+    ground : GroundSurface or None
+        None: flat ground at 0.
 
     Returns
     -------
     pandas.DataFrame
-        As from `grid`.
+        `sensor`, `x_m`, `y_m`, `z_m`; labels `row_column`, both from 1, from the southwest.
     """
     row, column = np.divmod(np.arange(rows * columns), columns)
-    return pd.DataFrame(
-        {
-            "sensor": [f"{r + 1}_{c + 1}" for r, c in zip(row, column, strict=True)],
-            "x_m": centre_m[0] + (column - 0.5 * (columns - 1)) * spacing_m,
-            "y_m": centre_m[1] + (row - 0.5 * (rows - 1)) * spacing_m,
-            "z_m": np.full(rows * columns, ground_z_m + height_m, float),
-        }
-    )
+    x_m = centre_m[0] + (column - 0.5 * (columns - 1)) * spacing_m
+    y_m = centre_m[1] + (row - 0.5 * (rows - 1)) * spacing_m
+    below_m = (ground or ground_surface.flat(0.0)).height_m(np.column_stack([x_m, y_m]))
+    labels = [f"{r + 1}_{c + 1}" for r, c in zip(row, column, strict=True)]
+    return pd.DataFrame({"sensor": labels, "x_m": x_m, "y_m": y_m, "z_m": below_m + height_m})
 
 
 def check(
     sensors: pd.DataFrame,
-    meshes: Mapping[str, Mesh],
+    surfaces: Iterable[Surface] = (),
     *,
     bounds_m: np.ndarray | None = None,
     margin_m: float = 30.0,
     clearance_m: float = 0.005,
-    ground_z_m: float | None = None,
+    ground: GroundSurface | None = None,
     where: str | Path = "sensors",
 ) -> None:
     """Make sure that every sensor stands in the scene, and not in a leaf, in wood or underground.
@@ -143,16 +146,16 @@ def check(
     ----------
     sensors : pandas.DataFrame
         `sensor`, `x_m`, `y_m`, `z_m` (local frame).
-    meshes : dict of str to Mesh
-        What the sensors must keep clear of, by kind (`leaf`, `wood`); it also spans the scene.
+    surfaces : iterable of Surface
+        What the sensors must keep clear of, but for the ground; it also spans the scene.
     bounds_m : (2, 3) float or None
         Lowest and highest corner of further parts of the scene, such as voxels [m].
     margin_m : float
         How far outside the bounding box of the scene a sensor may stand [m].
     clearance_m : float
         Smallest distance from a surface [m].
-    ground_z_m : float or None
-        Height of the ground [m]; None: there is none.
+    ground : GroundSurface or None
+        None: there is none.
     where : str or path
         The file or key, for messages.
 
@@ -163,7 +166,8 @@ def check(
     """
     _check_labels(sensors["sensor"], where)
     points = sensors[POSITION].to_numpy(float)
-    corners = [m.vertices_m for m in meshes.values() if len(m.vertices_m)]
+    surfaces = list(surfaces)
+    corners = [one.mesh.vertices_m for one in surfaces if len(one.mesh.vertices_m)]
     corners += [] if bounds_m is None else [np.asarray(bounds_m, float)]
     if corners:
         low = np.min([c.min(axis=0) for c in corners], axis=0)
@@ -178,26 +182,36 @@ def check(
                 f"at most {margin_m:g} m",
                 "Check the origin and the coordinate system of the sensor table.",
             )
-    if ground_z_m is not None and (points[:, 2] < ground_z_m).any():
-        lowest = int(points[:, 2].argmin())
+    above = points[:, 2] - ground.height_m(points[:, :2]) if ground else np.zeros(1)
+    if (above < 0).any():
+        lowest = int(above.argmin())
         raise InputError(
             where,
-            f"sensor {sensors['sensor'].iloc[lowest]} {ground_z_m - points[lowest, 2]:.3f} m "
-            "below the ground",
-            f"z of at least {ground_z_m:g} m",
+            f"sensor {sensors['sensor'].iloc[lowest]} {-above[lowest]:.3f} m below the ground",
+            f"z of at least {points[lowest, 2] - above[lowest]:g} m",
             "Raise the sensor or lower the ground.",
         )
-    for kind, mesh in meshes.items():
-        distance = surface_distance(points, mesh, clearance_m)
+    for surface in (one for one in surfaces if one.optics != GROUND):
+        distance = surface_distance(points, surface.mesh, clearance_m)
         nearest = int(distance.argmin()) if len(distance) else 0
         if len(distance) and distance[nearest] < clearance_m:
             raise InputError(
                 where,
                 f"sensor {sensors['sensor'].iloc[nearest]} {1000 * distance[nearest]:.1f} mm "
-                f"from {kind}, in effect inside it",
+                f"from {surface.optics}, in effect inside it",
                 f"at least {1000 * clearance_m:g} mm",
                 "Move the sensor, or check that sensors and scan share one frame.",
             )
+
+
+def lifted(sensors: pd.DataFrame, ground: GroundSurface) -> pd.DataFrame:
+    """Sensors that lie a little below a ground that was found in a cloud, laid upon it.
+
+    Survey and scan agree to some centimetres. What lies deeper than `DEEPEST_M` stays, for `check`.
+    """
+    height = ground.height_m(sensors[["x_m", "y_m"]].to_numpy(float))
+    below = (sensors["z_m"] < height + LIFT_M) & (sensors["z_m"] > height - DEEPEST_M)
+    return sensors.assign(z_m=sensors["z_m"].where(~below, height + LIFT_M))
 
 
 def surface_distance(points_m: np.ndarray, mesh: Mesh, within_m: float) -> np.ndarray:

@@ -13,6 +13,7 @@ from dapple.cloud.classify import classify
 from dapple.cloud.clean import clean
 from dapple.formats import shots as shot_files
 from dapple.formats.clouds import WOOD, Cloud
+from dapple.formats.ground_surface import flat
 from dapple.formats.meshes import Mesh
 from dapple.formats.shots import Shots
 from dapple.light import series
@@ -107,8 +108,8 @@ class Chain:
             cloud = shot_files.to_cloud(self.shots(conditions))
             drift = np.float32(conditions.drift_db)
             cloud.attributes["Reflectance"] = cloud.attributes["Reflectance"] + drift
-            ground_z_m = self.setup.ground_z_m
-            return clean(cloud, **self.setup.clean, ground_z_m=ground_z_m, where="scan")[0]
+            ground = flat(self.setup.ground_z_m)
+            return clean(cloud, **self.setup.clean, ground=ground, where="scan")[0]
 
         return self._step("clean", conditions, make)
 

@@ -10,6 +10,7 @@ import pandas as pd
 import xarray as xr
 
 from dapple.formats import shots as shot_files
+from dapple.formats.ground_surface import flat
 from dapple.formats.meshes import Mesh, concatenate
 from dapple.formats.shots import Shots
 from dapple.scene import sensors
@@ -334,7 +335,7 @@ def sensors_m(setup: Setup, conditions: Conditions) -> np.ndarray:
         away = np.radians(sun["sun_azimuth_deg"] + 180)
         length_m = middle_m * np.tan(np.radians(sun["sun_zenith_deg"]))
         centre = length_m * np.array([np.sin(away), np.cos(away)])
-    table = sensors.grid_around(centre, **setup.sensors, ground_z_m=setup.ground_z_m)
+    table = sensors.grid_around(centre, **setup.sensors, ground=flat(setup.ground_z_m))
     return table[["x_m", "y_m", "z_m"]].to_numpy(float)
 
 

@@ -1,0 +1,22 @@
+"""Look at all input before anything is computed."""
+
+from dapple import findings
+from dapple.check import page
+from dapple.check.inspection import inspect
+from dapple.findings import Finding
+from dapple.formats import json
+from dapple.formats.atomic import atomic
+from dapple.workflow import options, run
+
+
+def main(snakemake):
+    settings, inputs = options(snakemake.params), snakemake.input
+    check = inspect(settings, cloud=inputs.cloud, sensors=inputs.sensors)
+    json.write(snakemake.output.json, check)
+    with atomic(snakemake.output.html) as partial:
+        partial.write_text(page.page(json.read(snakemake.output.json)))
+    findings.say(Finding(**row) for row in check["findings"] if row["level"] == "warning")
+
+
+if __name__ == "__main__":
+    run(main, snakemake)
