@@ -2,7 +2,7 @@
 CORES ?= 2
 BIN := .venv/bin
 
-.PHONY: run test setup lint format docs lock
+.PHONY: run test setup lint format docs lock coverage hooks
 
 run: setup
 	$(BIN)/snakemake --cores $(CORES)
@@ -18,11 +18,20 @@ lint:
 	$(BIN)/ruff format --check .
 	$(BIN)/snakefmt --check Snakefile rules
 	$(BIN)/snakemake --lint
+	PYTHONPATH=scripts $(BIN)/lint-imports --no-cache
+	$(BIN)/python tools/dead_code.py
 
 format: setup
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 	$(BIN)/snakefmt Snakefile rules
+
+# Lines that unit tests and closed forms run; jobs of the small runs are processes of their own.
+coverage: setup
+	$(BIN)/python -m pytest -q -n $(CORES) --cov --cov-report=term tests/unit tests/physics
+
+hooks: setup
+	$(BIN)/pre-commit install
 
 docs: setup
 	PYTHONPATH=scripts $(BIN)/python -m dapple.config.docs

@@ -46,10 +46,8 @@ def simulated(frame, networks, interval, params):
     parts = network.split(
         frame["combination"].to_numpy(), seed=params.split_seed, **dict(params.split)
     )
-    features, target = (
-        training_entries.features(frame, params.bands),
-        frame["chlorophyll_ug_cm2"].to_numpy(float),
-    )
+    features = training_entries.features(frame, params.bands)
+    target = training_entries.chlorophyll(frame)
     noisy = Noise(**params.errors).add(features, np.random.default_rng(params.split_seed))
     rows = []
     for test_set, part, bands in (

@@ -44,10 +44,8 @@ def calibrate(frame, networks, noise, params):
     parts = network.split(
         frame["combination"].to_numpy(), seed=params.split_seed, **dict(params.split)
     )
-    features, target = (
-        training_entries.features(frame, params.bands),
-        frame["chlorophyll_ug_cm2"].to_numpy(float),
-    )
+    features = training_entries.features(frame, params.bands)
+    target = training_entries.chlorophyll(frame)
     if noise:
         features = noise.add(features, np.random.default_rng(params.split_seed))
     held = parts["validation"]

@@ -16,10 +16,8 @@ def main(snakemake):
     parts = network.split(
         frame["combination"].to_numpy(), seed=params.split_seed, **dict(params.split)
     )
-    features, target = (
-        training_entries.features(frame, params.bands),
-        frame["chlorophyll_ug_cm2"].to_numpy(),
-    )
+    features = training_entries.features(frame, params.bands)
+    target = training_entries.chlorophyll(frame)
     margin = 0.1 * (params.range_ug_cm2[1] - params.range_ug_cm2[0])
     histories = []
     for seed, path in zip(params.seeds, snakemake.output.networks, strict=True):

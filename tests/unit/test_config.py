@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from dapple.config import checks, docs
+from dapple.config import checks, docs, study_checks
 from dapple.config.settings import Settings, validate
 from dapple.errors import InputError, MissingMissesError
 
@@ -234,22 +234,26 @@ def test_values_that_contradict_each_other_are_named_together(config, found):
     assert error.value.remedy
 
 
+CHECKS = {one.__name__: one for one in checks.CHECKS}
+
+
 @pytest.mark.parametrize("name", CONTRADICTIONS)
 def test_it_is_the_check_of_that_name_that_finds_them(name):
     for config, found in CONTRADICTIONS[name]:
         settings = Settings.model_validate(config)
         with pytest.raises(InputError) as error:
-            getattr(checks, name)(settings, "mine.yaml")
+            CHECKS[name](settings, "mine.yaml")
         assert found in error.value.found
 
 
 def test_every_check_is_called_and_has_a_case_that_it_finds():
     written = [
         name
-        for name, one in inspect.getmembers(checks, inspect.isfunction)
-        if one.__module__ == checks.__name__ and one is not checks.check
+        for module in (checks, study_checks)
+        for name, one in inspect.getmembers(module, inspect.isfunction)
+        if one.__module__ == module.__name__ and one is not checks.check
     ]
-    assert sorted(one.__name__ for one in checks.CHECKS) == sorted(written)
+    assert sorted(CHECKS) == sorted(written)
     assert sorted(CONTRADICTIONS) == sorted(written)
 
 

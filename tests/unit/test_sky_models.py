@@ -8,14 +8,12 @@ import xarray as xr
 from dapple.errors import InputError
 from dapple.light import tensor, transport
 from dapple.scene import traced
-from dapple.scene.scene_optics import Optics
 from dapple.scene.surfaces import Scene
 from dapple.sky import measured_sky, models, sky_radiance
 from dapple.sky.conditions import Conditions, Ways
 from dapple.sky.patches import patches
 
 SUN = {"sun_zenith_deg": ("time", [40.0]), "sun_azimuth_deg": ("time", [200.0])}
-BLACK = Optics.of_tree(*np.zeros((5, 1)))
 
 
 def sky(model, coefficients=None):

@@ -59,7 +59,6 @@ class Header:
     low: np.ndarray
     high: np.ndarray
     records: dict[tuple[str, int], list[bytes]]
-    software: str
     notes: tuple[str, ...]
 
 
@@ -124,7 +123,6 @@ def read(path: Path) -> Header:
         bounds[:, 1],
         bounds[:, 0],
         records,
-        raw[58:90].split(b"\0")[0].decode("ascii", "replace").strip(),
         tuple(notes),
     )
 

@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 
 from dapple import frames
-from dapple.errors import InputError
 from dapple.formats import text_layout
 from dapple.formats.atomic import atomic
 from dapple.formats.cloud_raw import RawCloud, ScanFacts, Source, Units, attribute_name, distinct
@@ -81,7 +80,7 @@ def read_table(path: Path, layout: Layout) -> pd.DataFrame:
     except pd.errors.EmptyDataError:
         return pd.DataFrame(columns=layout.names, dtype=float)
     except (pd.errors.ParserError, pd.errors.ParserWarning, ValueError) as error:
-        raise wrong(path, " ".join(str(error).split())[:200]) from error
+        raise text_layout.no_table(path, " ".join(str(error).split())[:200]) from error
 
 
 def write(path: Path, raw: RawCloud) -> None:
@@ -131,7 +130,7 @@ def _numbers(path: Path, column: pd.Series, layout: Layout) -> np.ndarray:
     if len(bad):
         row = int(bad[0])
         cell = str(column.iloc[row])[:40]
-        raise wrong(path, f"'{cell}' in column {column.name}, data row {row + 1}")
+        raise text_layout.no_table(path, f"'{cell}' in column {column.name}, data row {row + 1}")
     return numbers.to_numpy(float)
 
 
@@ -148,13 +147,3 @@ def _attribute(column: pd.Series, name: str, notes: list[str]) -> np.ndarray | N
     cell = re.sub(r"\s+", " ", str(column.iloc[bad[0]]))[:30]
     notes.append(f"Column {name} is left out: '{cell}' in data row {bad[0] + 1} is no number.")
     return None
-
-
-def wrong(path: Path, found: str) -> InputError:
-    """The error of a text that is no table of points."""
-    return InputError(
-        path,
-        found,
-        "a table of numbers with columns X Y Z (header optional; further columns need one)",
-        "Correct the line, or export again with a header such as 'X Y Z Reflectance'.",
-    )

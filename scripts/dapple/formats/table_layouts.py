@@ -12,7 +12,7 @@ from pathlib import Path
 import pandas as pd
 
 from dapple.errors import InputError
-from dapple.formats.user_tables import Table, build
+from dapple.formats.text_table import Table, build
 
 JOINED_TIME = "time"
 """Column that is made of a layout's columns of year, month, day, hour and minute."""

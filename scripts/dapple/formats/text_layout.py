@@ -108,7 +108,7 @@ def find(path: Path) -> Layout | None:
     words = [word for line in lines[-3:] for word in line.split()]
     if any(_has_axes(line) for line in lines) or not words:
         return None
-    raise _no_table(path, "no row of numbers: '" + " ".join(words)[:80] + "'")
+    raise no_table(path, "no row of numbers: '" + " ".join(words)[:80] + "'")
 
 
 def axis(name: str) -> Axis | None:
@@ -177,7 +177,7 @@ def _names(
             return _unique(names, width, words), names
         fields = _split(text, separator)
         if len(fields) == width and not line.lstrip().startswith(tuple(MARKS[:4])):
-            raise _no_table(path, f"the columns '{text[:80]}'")
+            raise no_table(path, f"the columns '{text[:80]}'")
     return ("X", "Y", "Z", *(f"column_{k}" for k in range(4, width + 1))), None
 
 
@@ -212,7 +212,8 @@ def _has_axes(text: str) -> bool:
     )
 
 
-def _no_table(path: Path, found: str) -> InputError:
+def no_table(path: Path, found: str) -> InputError:
+    """The error of a text that is no table of points."""
     return InputError(
         path,
         found,

@@ -61,8 +61,6 @@ class Received:
         Reflectance factor per `Counters.spectral_factor`.
     n_views, n_replicates : int
         How many there are.
-    cut_share : float
-        Share of paths given up at `max_orders`.
     counters : Counters
         What is counted.
     """
@@ -74,7 +72,6 @@ class Received:
     weight: np.ndarray
     n_views: int
     n_replicates: int
-    cut_share: float
     counters: Counters
 
 
@@ -150,15 +147,14 @@ def collect(
     scene.counters.check(max_orders)
     n_views, per_set = len(views.axis), -(-n_paths // n_replicates)
     limits = max_orders, max_orders + 1 if halved_after is None else halved_after
-    parts, cut = [], 0
+    parts = []
     total = n_views * n_replicates * per_set
     for low in range(0, total, PATHS_PER_KERNEL):
         n = min(PATHS_PER_KERNEL, total - low)
-        found, lost = _trace_block(
+        found = _trace_block(
             scene, views, sun_direction, low, n, per_set, n_replicates, *limits, seed
         )
         parts.append(_summed(*found))
-        cut += lost
     start, orders, weight = _summed(*(np.concatenate(part) for part in zip(*parts, strict=True)))
     start, source = np.divmod(start, 2)
     return Received(
@@ -169,7 +165,6 @@ def collect(
         weight=weight / per_set,
         n_views=n_views,
         n_replicates=n_replicates,
-        cut_share=cut / total,
         counters=scene.counters,
     )
 
@@ -218,7 +213,7 @@ def _summed(
 def _trace_block(
     scene, views, sun_direction, low, n, per_set, n_replicates, max_orders, halved_after, seed
 ):
-    """Follow n paths; starts, orders and weights of what they bring, and how many are cut.
+    """Follow n paths; starts, orders and weights of what they bring.
 
     Paths that have ended are left out after every surface: few go on for long.
     """
@@ -231,16 +226,15 @@ def _trace_block(
     rng = mi.PCG32(initstate=mi.UInt64(state), initseq=mi.UInt64(sequence))
     view = start // dr.opaque(mi.UInt32, n_replicates)
     origin, direction = _first_rays(mi, views, view, (point, shift), number, rng)
-    parts, lost = [], 0
+    parts = []
     limits = max_orders, halved_after
     for whose, source, met_orders, brought in follow(
         scene, start, origin, direction, rng, sun_direction, *limits
     ):
         if source is None:
-            lost = len(whose)
-            break
+            break  # what is left is given up
         parts.append((whose.astype(np.int64) * 2 + source, met_orders, brought.astype(np.float64)))
-    return tuple(np.concatenate(part) for part in zip(*parts, strict=True)), lost
+    return tuple(np.concatenate(part) for part in zip(*parts, strict=True))
 
 
 def follow(

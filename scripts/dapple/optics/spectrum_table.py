@@ -11,6 +11,7 @@ from dapple import findings
 from dapple.errors import InputError
 from dapple.findings import Finding
 from dapple.formats import user_tables
+from dapple.formats.text_table import Table
 
 WAVELENGTH_NAMES = ("wavelength_nm", "wavelength", "wavelength_um", "wl", "lambda", "nm")
 REFLECTANCE_NAMES = ("reflectance", "front_reflectance", "refl")
@@ -114,11 +115,11 @@ def read(
     return Spectrum(table["wavelength_nm"].to_numpy(), kept, tuple(noticed))
 
 
-def _column(source: user_tables.Table, asked: str, usual: Sequence[str], key: str) -> str:
+def _column(source: Table, asked: str, usual: Sequence[str], key: str) -> str:
     return source.require([asked] if asked else usual, key)
 
 
-def _numbers(source: user_tables.Table, column: str) -> tuple[np.ndarray, str]:
+def _numbers(source: Table, column: str) -> tuple[np.ndarray, str]:
     numbers = source.numbers(column, FLAGS)
     return numbers.values, numbers.unit
 

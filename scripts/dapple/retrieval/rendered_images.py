@@ -57,11 +57,9 @@ class Renderer:
     """
 
     def __init__(self, scene: Scene, *, variant: str = "llvm_ad_rgb"):
-        started = perf_counter()
         grey = Optics.of_tree(*np.full((5, CHANNELS), 0.2))
         self.loaded = mitsuba_scene.build(scene, grey, variant=variant)
         self.variant, self.top_z_m = variant, float(scene.bounds_m[1, 2])
-        self.build_s = perf_counter() - started
 
     def render(
         self,

@@ -240,3 +240,8 @@ def table(means: np.ndarray, count: np.ndarray, bands: Sequence[str]) -> pd.Data
 def features(frame: pd.DataFrame, bands: Sequence[str]) -> np.ndarray:
     """The bands of a table (n, b), float32."""
     return frame[list(bands)].to_numpy(np.float32)
+
+
+def chlorophyll(frame: pd.DataFrame) -> np.ndarray:
+    """What the bands of a table are to tell, (n,) float64 [µg cm⁻²]."""
+    return frame["chlorophyll_ug_cm2"].to_numpy(float)

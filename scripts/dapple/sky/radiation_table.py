@@ -11,7 +11,8 @@ from dapple import findings, timezones
 from dapple.errors import InputError
 from dapple.findings import Finding
 from dapple.formats import units, user_tables
-from dapple.formats.user_tables import LIGHT_FLAGS, TIME_NAMES, Table
+from dapple.formats.text_table import Table
+from dapple.formats.user_tables import LIGHT_FLAGS, TIME_NAMES
 from dapple.times import AHEAD, parse
 
 GLOBAL_NAMES = ("global_W_m2", "global", "ghi", "globalstrahlung")

@@ -12,7 +12,9 @@ from dapple import findings, timezones
 from dapple.errors import InputError
 from dapple.findings import Finding
 from dapple.formats import units, user_tables
-from dapple.formats.user_tables import LIGHT_FLAGS, TIME_NAMES, Table
+from dapple.formats.table_numbers import Numbers
+from dapple.formats.text_table import Table
+from dapple.formats.user_tables import LIGHT_FLAGS, TIME_NAMES
 from dapple.times import AHEAD, parse
 
 MIN_PAR_UMOL_M2_S = -20.0  # offsets of a sensor in the dark
@@ -181,7 +183,7 @@ def _long(
     sensor_column: str,
     par_column: str,
     missing: Sequence[str | float],
-) -> tuple[pd.DataFrame, dict[str, user_tables.Numbers]]:
+) -> tuple[pd.DataFrame, dict[str, Numbers]]:
     """One row a record: `line`, `sensor`, `column`, `par_umol_m2_s`; and the columns read."""
     flags = (*LIGHT_FLAGS, *missing)
     sensor = sensor_column and source.require([sensor_column], "measured.sensor_column")
@@ -275,7 +277,7 @@ def _is_of(name: str, label: str) -> bool:
 def _in_micromoles(
     long: pd.DataFrame,
     source: Table,
-    columns: dict[str, user_tables.Numbers],
+    columns: dict[str, Numbers],
     declared: str,
     interval_min: float,
 ) -> list[Finding]:

@@ -1,19 +1,15 @@
-"""Which voxels a cloud is dense enough for, and how much its leaf area depends on that choice."""
-
-from collections.abc import Iterable
+"""Which voxels a cloud is dense enough for."""
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from dapple.structure.polygons import HALF_POINT_SPACING_M, reconstruct
+from dapple.structure.polygons import HALF_POINT_SPACING_M
 
 SMALLEST_M = 0.05
 """Frey et al. (2025): about a leaf; smaller voxels cut leaves in pieces."""
 SPACINGS = 3.0
 """Points along the edge of a voxel: enough of them lie in it for a hull."""
 SAMPLE = 20_000
-BRACKET = (0.5, 1.0, 2.0)
-"""Sizes for which the area is told, in terms of the one chosen."""
 
 
 def spacing_m(xyz_m: np.ndarray) -> float:
@@ -51,12 +47,4 @@ def fitting(spacing: float) -> dict[str, float]:
     return {
         "voxel_size_m": round(float(size), 3),
         "buffer_m": round(max(HALF_POINT_SPACING_M, spacing / np.sqrt(2)), 6),
-    }
-
-
-def areas_m2(points_m: np.ndarray, sizes_m: Iterable[float], **settings) -> dict[str, float]:
-    """Area of the polygons of some points for each of some voxel sizes [m²]; see `reconstruct`."""
-    return {
-        f"{size:g}": reconstruct(points_m, voxel_size_m=size, **settings).area_m2
-        for size in sizes_m
     }

@@ -1,0 +1,187 @@
+"""A table whose cells are text, and how lines of a file become one."""
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import pandas as pd
+
+from dapple.errors import InputError
+from dapple.formats import table_numbers
+from dapple.formats.table_numbers import Numbers
+
+UNIT_IN_HEADER = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*$")
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table whose cells are still text, with what the file itself says of them.
+
+    Attributes
+    ----------
+    path : Path
+    cells : pandas.DataFrame
+        Text, stripped; the index is the line of the file on which a row stands.
+    units : dict of str to str
+        Unit of a column as its header or a row of units has it.
+    layout : str
+        `plain`, or the logger or service whose layout the file has.
+    timezone : str or None
+        Zone of the times where the file names one.
+    interval_label : str
+        Which end of its interval a time marks where the layout fixes it, else "".
+    interval_min : float or None
+        Length of the intervals where the layout fixes it [min]; 0: samples of a moment.
+    known : dict of str to str
+        Columns that a layout fixes: `time`, `global`, `diffuse`, `par`, …
+    decimal : str
+        Decimal sign of the numbers: "." or ","; "": as the cells show.
+    """
+
+    path: Path
+    cells: pd.DataFrame
+    units: dict[str, str] = field(default_factory=dict)
+    layout: str = "plain"
+    timezone: str | None = None
+    interval_label: str = ""
+    interval_min: float | None = None
+    known: dict[str, str] = field(default_factory=dict)
+    decimal: str = ""
+
+    def find(self, names: Sequence[str]) -> str | None:
+        """The first column with one of these names; capitals and a unit behind it do not matter."""
+        spelled = {_bare(column): column for column in reversed(self.cells.columns)}
+        exact = (name for name in names if name in self.cells)
+        loose = (spelled[_bare(name)] for name in names if _bare(name) in spelled)
+        return next(exact, None) or next(loose, None)
+
+    def require(self, names: Sequence[str], key: str) -> str:
+        """As `find`, or an error that lists the columns and the configuration key.
+
+        Raises
+        ------
+        InputError
+            No such column.
+        """
+        if (column := self.find(names)) is not None:
+            return column
+        raise InputError(
+            self.path,
+            f"columns {', '.join(self.cells.columns)}",
+            f"a column {' or '.join(names)}",
+            f"Name the column in `{key}`.",
+        )
+
+    def text(self, column: str) -> pd.Series:
+        """A column as text."""
+        return self.cells[column]
+
+    def numbers(self, column: str, flags: Collection[str | float] = ()) -> Numbers:
+        """A column as numbers.
+
+        Parameters
+        ----------
+        column : str
+        flags : texts or numbers
+            What stands for a missing value besides an empty cell, NAN and the like.
+
+        Raises
+        ------
+        InputError
+            A cell that is neither a number nor a flag, with its line; or numbers whose decimal
+            sign cannot be told.
+        """
+        where = f"{self.path}, column {column!r}"
+        decimal = self.decimal or table_numbers.decimal_sign(self.cells, column, where)
+        found = table_numbers.parse(self.cells[column], where, decimal=decimal, flags=flags)
+        return replace(found, unit=found.unit or self.units.get(column, ""))
+
+
+def build(
+    path: Path,
+    lines: Sequence[str],
+    *,
+    header: int,
+    delimiter: str,
+    first: int | None = None,
+    **facts: object,
+) -> Table:
+    """A table from the lines of a file whose header is known.
+
+    Parameters
+    ----------
+    path : Path
+    lines : list of str
+    header : int
+        Index of the line with the names of the columns.
+    delimiter : str
+        One character, or " " for any white space.
+    first : int or None
+        Index of the first line of values; None: the one after the header.
+    **facts
+        Further attributes of the table.
+    """
+    names, in_header = _names(path, cells_of(lines[header], delimiter), header + 1)
+    first = header + 1 if first is None else first
+    rows, numbers = [], []
+    for number, line in enumerate(lines[first:], start=first + 1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        row = cells_of(line, delimiter)
+        while len(row) > len(names) and not row[-1]:
+            row.pop()
+        if len(row) != len(names):
+            raise uneven(path, number, line, len(row), len(names))
+        rows.append(row)
+        numbers.append(number)
+    cells = pd.DataFrame(rows, columns=names, index=pd.Index(numbers, dtype=int), dtype=str)
+    units = in_header | dict(facts.pop("units", {}))  # type: ignore[call-overload]
+    return Table(path, cells, units=units, **facts)  # type: ignore[arg-type]
+
+
+def cells_of(line: str, delimiter: str) -> list[str]:
+    """The cells of a line, stripped."""
+    if delimiter == " ":
+        return line.replace('"', "").split()
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
+
+
+def uneven(path: Path, number: int, line: str, found: int, expected: int) -> InputError:
+    """The error of a row with more or fewer cells than the header."""
+    return InputError(
+        f"{path}, line {number}",
+        f"{found} cells ('{line.strip()[:60]}')",
+        f"{expected}, as the header has",
+        "Complete or remove the line; numbers with a comma inside need quotes.",
+    )
+
+
+def trimmed(row: list[str]) -> list[str]:
+    """A row without the empty cells at its end."""
+    while row and not row[-1]:
+        row = row[:-1]
+    return row
+
+
+def _names(path: Path, row: list[str], line: int) -> tuple[list[str], dict[str, str]]:
+    """Names of the columns, and the units in brackets behind them."""
+    names = [name or f"column_{number}" for number, name in enumerate(trimmed(row), start=1)]
+    if repeated := [name for name, count in Counter(names).items() if count > 1]:
+        raise InputError(
+            f"{path}, line {line}",
+            f"two columns called {repeated[0]}",
+            "each name once",
+            "Rename one of them.",
+        )
+    found = {name: UNIT_IN_HEADER.match(name) for name in names}
+    in_header = {name: match["unit"].strip() for name, match in found.items() if match}
+    return names, {name: unit for name, unit in in_header.items() if not unit.isdigit()}
+
+
+def _bare(name: str) -> str:
+    """A name without its unit, in small letters."""
+    match = UNIT_IN_HEADER.match(name)
+    return (match["name"] if match else name).strip().lower()
