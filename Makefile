@@ -36,6 +36,7 @@ hooks: setup
 docs: setup
 	PYTHONPATH=scripts $(BIN)/python -m dapple.config.docs
 	$(BIN)/python tools/pages.py
+	$(BIN)/python tools/rule_graph.py
 
 lock: setup
 	$(BIN)/uv pip compile pyproject.toml --group dev --generate-hashes --universal --no-header --quiet -o requirements.lock
