@@ -38,7 +38,11 @@ REFERENCE_TIMES = list(
     range(
         0,
         N_TIMES,
-        max(1, round(settings.light.timestep.step_min / settings.time.step_min)),
+        (
+            max(1, round(settings.light.timestep.step_min / settings.time.step_min))
+            if settings.light.engine == "transport"
+            else 1
+        ),
     )
 )
 SENSOR_TABLE = settings.sensors.path or "sensors"

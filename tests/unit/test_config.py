@@ -175,7 +175,6 @@ CONTRADICTIONS = {
         ),
         ({"site": {"timezone": "Europe/Berln"}}, "Europe/Berln"),
     ],
-    "timesteps": [({"time": {"step_min": 4}}, "time.step_min: 4")],
     "spectra": [
         ({"optics": {"bark": {"wavelength_nm": [400.0, 500.0, 700.0]}}}, "3 wavelengths"),
     ],

@@ -180,19 +180,6 @@ def registration(settings: Settings, where: str) -> None:
             )
 
 
-def timesteps(settings: Settings, where: str) -> None:
-    """Two engines are compared at times that both have."""
-    ratio = settings.light.timestep.step_min / settings.time.step_min
-    if ratio > 1 and abs(ratio - round(ratio)) > 1e-9:
-        raise InputError(
-            where,
-            f"`light.timestep.step_min: {settings.light.timestep.step_min}` and "
-            f"`time.step_min: {settings.time.step_min}`",
-            "the first a multiple of the second",
-            "Change one of the two.",
-        )
-
-
 def spectra(settings: Settings, where: str) -> None:
     """A spectrum has a reflectance for each of its wavelengths."""
     for name, spectrum in (("bark", settings.optics.bark), ("ground", settings.optics.ground)):
@@ -269,7 +256,6 @@ CHECKS = (
     measured,
     registration,
     times,
-    timesteps,
     spectra,
     light,
     voxels,
