@@ -1,7 +1,18 @@
 """What tests of the whole workflow share."""
 
+from pathlib import Path
+
 import pytest
 from tests.workflow.project import copy_of_project
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Tests that share a run stay in one process, where tests are spread over several."""
+    for item in items:
+        if item.path.is_relative_to(Path(__file__).parent):
+            shares = "small_run" if "small_run" in item.fixturenames else item.path.stem
+            item.add_marker(pytest.mark.xdist_group(shares))
 
 
 @pytest.fixture(scope="session")
