@@ -33,9 +33,7 @@ class Transport(Section):
 class Timestep(Section):
     """The per-timestep engine: Mitsuba's own integrators, the independent check."""
 
-    step_min: Positive = key(
-        30.0, "about so many minutes lie between the times that are checked"
-    )
+    step_min: Positive = key(30.0, "about so many minutes lie between the times that are checked")
     times_per_job: Count = key(60, "times that one job computes, in one file")
     bands: Literal[1, 3] = key(3, "groups of bands, traced together")
     replicates: Annotated[int, Ge(2)] = key(16, "independent repetitions: the standard error")
