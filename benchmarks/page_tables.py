@@ -7,6 +7,7 @@ docs/data. `docs/data/README.md` lists the tables.
 """
 
 import argparse
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -20,7 +21,38 @@ def survey_small(folder: Path) -> dict[str, pd.DataFrame]:
     return {"survey_small_shadowing": pd.read_csv(folder / "survey" / "shadowing.csv")}
 
 
-RUNS: dict[str, Callable[[Path], dict[str, pd.DataFrame]]] = {"survey-small": survey_small}
+def agreement_with_truth(folder: Path) -> pd.DataFrame:
+    """How light under each reconstruction compares with records, and its leaf area [m²]."""
+    table = pd.read_csv(folder / "statistics" / "overall.csv")
+    summaries = {
+        path.parent.name: json.loads(path.read_text())
+        for path in folder.glob("structure/*/summary.json")
+    }
+    areas = {name: found["leaf_area_m2"] for name, found in summaries.items()}
+    areas |= {
+        "truth": found["true_leaf_area_m2"]
+        for found in summaries.values()
+        if "true_leaf_area_m2" in found
+    }
+    return table.assign(leaf_area_m2=table["reconstruction"].map(areas))
+
+
+def virtual_apple(folder: Path) -> dict[str, pd.DataFrame]:
+    """The default run: light against the truth's, and both engines against each other."""
+    engines = pd.read_csv(folder / "statistics" / "agreement.csv")
+    return {"default_run": agreement_with_truth(folder), "engines": engines}
+
+
+def apple(folder: Path) -> dict[str, pd.DataFrame]:
+    """The published tree: light against records that the registration has not seen."""
+    return {"apple": agreement_with_truth(folder)}
+
+
+RUNS: dict[str, Callable[[Path], dict[str, pd.DataFrame]]] = {
+    "survey-small": survey_small,
+    "virtual-apple": virtual_apple,
+    "apple": apple,
+}
 
 
 def main() -> None:
