@@ -22,11 +22,11 @@ from published_apple import Run
 from scipy.ndimage import gaussian_filter1d
 
 from dapple.light.rays_to_sky import Tracer
-from dapple.light.series import towards_sun
 from dapple.registration import shading
 from dapple.scene import traced
 from dapple.scene.surfaces import Scene, of_kinds
-from dapple.stats.correlation import pearson
+from dapple.sky.open_sky import towards_sun
+from dapple.stats.measures import pearson
 from dapple.streams import stream_seed
 from dapple.virtual.leaves import along_wood
 

@@ -29,11 +29,7 @@ def agreement_with_truth(folder: Path) -> pd.DataFrame:
         for path in folder.glob("structure/*/summary.json")
     }
     areas = {name: found["leaf_area_m2"] for name, found in summaries.items()}
-    areas |= {
-        "truth": found["true_leaf_area_m2"]
-        for found in summaries.values()
-        if "true_leaf_area_m2" in found
-    }
+    areas["truth"] = summaries["polygons"].get("true_leaf_area_m2")
     return table.assign(leaf_area_m2=table["reconstruction"].map(areas))
 
 
