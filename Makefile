@@ -20,6 +20,7 @@ lint:
 	$(BIN)/snakemake --lint
 	PYTHONPATH=scripts $(BIN)/lint-imports --no-cache
 	$(BIN)/python tools/dead_code.py
+	$(BIN)/mypy
 
 format: setup
 	$(BIN)/ruff check --fix .

@@ -160,7 +160,7 @@ def _within(
 
 def _imported(node: ast.Import | ast.ImportFrom) -> dict[str, tuple[Path, str | None]]:
     """Names that an import makes known, if they are dapple's: file, and name in it."""
-    found = {}
+    found: dict[str, tuple[Path, str | None]] = {}
     if isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
         for alias in node.names:
             known = alias.asname or alias.name

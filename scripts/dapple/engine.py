@@ -70,7 +70,7 @@ def use_threads(n: int) -> None:
 
     load()
     drjit.set_thread_count(n)
-    numba.set_num_threads(min(n, numba.config.NUMBA_NUM_THREADS))
+    numba.set_num_threads(min(n, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
 
 
 def _probe(variant: str) -> None:

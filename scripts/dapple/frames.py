@@ -5,6 +5,7 @@ azimuth clockwise from north, zenith from straight up.
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 FLOAT32_LIMIT_M = 8192.0
 """Up to here neighbouring float32 numbers are at most 1 mm apart (2**13 m, 24 bits)."""
@@ -13,7 +14,7 @@ FLOAT32_LIMIT_M = 8192.0
 # --- directions -----------------------------------------------------------------------------
 
 
-def direction_from_angles(zenith_deg: np.ndarray, azimuth_deg: np.ndarray) -> np.ndarray:
+def direction_from_angles(zenith_deg: ArrayLike, azimuth_deg: ArrayLike) -> np.ndarray:
     """Unit vectors that point towards a place in the sky.
 
     Parameters

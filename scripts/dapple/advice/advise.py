@@ -98,7 +98,7 @@ def geometry_effects(
     def loading(scene_of):
         return lambda: traced.load(scene_of(), variant)
 
-    ladders = {
+    ladders: dict[str, list[tuple[Any, Any]]] = {
         name: [(one.size_m, loading(one.load)) for one in geometries if one.kind == kind]
         for name, kind in (("polygon_size_m", "polygons"), ("voxel_size_m", "voxels"))
     }

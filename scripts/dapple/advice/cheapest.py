@@ -121,7 +121,7 @@ def choose(
         name: {
             level: effect.effect_rel
             for level, effect in levels.items()
-            if name != "step_min" or level > finest.step_min
+            if name != "step_min" or float(level) > finest.step_min
         }
         | {getattr(finest, name): 0.0}
         for name, levels in _by_refinement(effects).items()

@@ -98,7 +98,8 @@ class Grid:
         """
         best = self.truth or geometries[0].load()
         self.reference = self._finest(traced.load(best, self.variant))
-        rows, for_timesteps = [], []
+        rows: list[dict[str, Any]] = []
+        for_timesteps = []
         for geometry in geometries:
             name = geometry.kind
             name = name if name == "polygons" else f"voxels_{geometry.size_m}"

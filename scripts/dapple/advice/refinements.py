@@ -37,7 +37,7 @@ def rows(effects: list[Effect]) -> dict[str, list[dict]]:
     """Effects by refinement as plain values, for a file."""
     found: dict[str, list[dict]] = {}
     for effect in effects:
-        row = {
+        row: dict[str, Any] = {
             "level": effect.level,
             "effect_rel": effect.effect_rel,
             "rmse_rel": effect.rmse_rel,
@@ -90,7 +90,8 @@ def model_effects(
         best = getattr(pilot.finest, refinement)
         coarser = [level for level in levels if level != best and _is_coarser(level, best)]
         for level in coarser:
-            found = pilot.light(scene, replace(pilot.finest, **{refinement: level}))
+            change: dict[str, Any] = {refinement: level}
+            found = pilot.light(scene, replace(pilot.finest, **change))
             # The seed makes models share their paths, so that their differences have no noise.
             effects.append(
                 pilot.effect(refinement, level, found, finest[0], truth=truth, shared=True)
@@ -99,7 +100,7 @@ def model_effects(
     return effects, finest[0]
 
 
-def _is_coarser(level: str | float, best: str | float) -> bool:
+def _is_coarser(level: Any, best: Any) -> bool:
     return isinstance(level, str) or level < best
 
 

@@ -1,9 +1,8 @@
 """Accuracy against speed: errors, costs and what no other setting beats in both."""
 
-from collections.abc import Sequence
-
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 COLUMNS = [
     "setting",
@@ -27,7 +26,7 @@ PUBLISHED_S = {"polygons": 5.5, "voxels_1.0": 7.8, "voxels_0.2": 217.0}
 """Seconds of one LESS run, one sensor at one time, on another machine: Frey et al. (2025)."""
 
 
-def front(cost: Sequence[float], error: Sequence[float]) -> np.ndarray:
+def front(cost: ArrayLike, error: ArrayLike) -> np.ndarray:
     """Points that no other beats: none is both at most as dear and at most as wrong (Pareto).
 
     Parameters

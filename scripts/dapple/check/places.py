@@ -34,7 +34,7 @@ def judge_sensors(
     own = facts.cloud.origin_m
     try:
         origin = own if origin_m is None else np.asarray(origin_m, float)
-        table = sensors.read(path, origin, **columns)
+        table = sensors.read(path, origin.tolist(), **columns)
     except InputError as mistake:
         return {}, [findings.of(mistake)]
     places = table[sensors.POSITION].to_numpy(float)

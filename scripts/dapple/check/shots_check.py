@@ -137,7 +137,7 @@ def thinned(scan: OrderedScan, most: int) -> OrderedScan:
         scan.xyz_m[kept],
         scan.column[kept] // every,
         scan.row[kept] // every,
-        tuple(-(-n // every) for n in scan.shape),
+        (-(-scan.shape[0] // every), -(-scan.shape[1] // every)),
         scan.rotation,
         scan.position_m,
         {name: values[kept] for name, values in scan.attributes.items()},

@@ -90,7 +90,7 @@ class CommandLine:
             limit_s = programs.limit_s(len(xyz_m))
             self._run([given, surface], ["-C2M_DIST"], result, limit_s)
             points = self._read(result)
-        field = next(name for name in points.dtype.names if name.startswith("scalar_C2M"))
+        field = next(name for name in points.dtype.names or () if name.startswith("scalar_C2M"))
         distance_m = np.empty(len(xyz_m))
         rows = _rows(*_columns(points, ("scalar_RowHigh", "scalar_RowLow")))
         distance_m[rows] = np.abs(points[field])  # signed where triangles have a front side

@@ -103,7 +103,8 @@ def sub_crowns(
     crown : (s,) int32
         The crown of each sub-crown.
     """
-    sub, crown = np.zeros_like(labels), []
+    sub = np.zeros_like(labels)
+    crown: list[int] = []
     places = ndimage.find_objects(labels)
     # One thread: crowns are small, and the sums' order has to be the same everywhere.
     with threadpool_limits(1):
@@ -168,7 +169,7 @@ def outlines(labels: np.ndarray) -> np.ndarray:
             other = np.roll(labels, step, axis)
             differs = other != labels
             # Rolling wraps round: the border of the map is no outline.
-            border = [slice(None), slice(None)]
+            border: list[slice | int] = [slice(None), slice(None)]
             border[axis] = 0 if step == 1 else -1
             differs[tuple(border)] = False
             edge |= differs

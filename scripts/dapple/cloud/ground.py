@@ -171,7 +171,7 @@ def elevation(world_xyz_m: np.ndarray, extent_m: np.ndarray, *, pixel_m: float, 
     median = _by_pixel(row * columns + column, world_xyz_m[:, 2] - base, rows * columns)
     known = np.flatnonzero(np.isfinite(median))
     places = np.stack(np.unravel_index(known, (rows, columns)), axis=1).astype(float)
-    everywhere = np.stack(np.mgrid[:rows, :columns], axis=-1).reshape(-1, 2).astype(float)
+    everywhere = np.moveaxis(np.mgrid[:rows, :columns], 0, -1).reshape(-1, 2).astype(float)
     filled = np.full(rows * columns, np.nan)
     if len(known) > 3 and np.ptp(places, axis=0).min() > 0:
         filled = LinearNDInterpolator(places, median[known])(everywhere)

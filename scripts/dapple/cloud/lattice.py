@@ -220,8 +220,8 @@ def _coarse_azimuth(terms, azimuth, weight, step: float) -> np.ndarray:
     coefficients[1:3] = best[1:]
     phase = phase - terms[some, 1:3] @ coefficients[1:3] / step
     stretch = np.linspace(-2e-3, 2e-3, 41)
-    agreement = [_coherence(phase - azimuth[some] * s / step, weight) for s in stretch]
-    coefficients[6] = stretch[int(np.argmax(agreement))]
+    by_stretch = [_coherence(phase - azimuth[some] * s / step, weight) for s in stretch]
+    coefficients[6] = stretch[int(np.argmax(by_stretch))]
     phase = phase - azimuth[some] * coefficients[6] / step
     coefficients[0] = step * np.angle((weight * np.exp(2j * np.pi * phase)).sum()) / (2 * np.pi)
     return coefficients

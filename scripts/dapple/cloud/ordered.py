@@ -131,7 +131,9 @@ def _nothing(origin_m: np.ndarray) -> Shots:
     )
 
 
-def _fitted(scan: OrderedScan, places, source) -> tuple[OrderedScan, "_Angle", "_Angle"]:
+def _fitted(
+    scan: OrderedScan, places: tuple[np.ndarray, np.ndarray, np.ndarray], source
+) -> tuple[OrderedScan, "_Angle", "_Angle"]:
     """The scan with its columns in azimuth, and the angles of its columns and rows."""
     try:
         return scan, *_fit_grid(scan, *places, source)

@@ -291,7 +291,7 @@ def energies(
         far = pulses.range_m / np.nanmedian(pulses.range_m)
         energy *= np.where(np.isnan(far), 1.0, far) ** range_exponent
     ground = is_ground[pulses.point]
-    facts = {"intensity": "configured ratio"}
+    facts: dict[str, str | float] = {"intensity": "configured ratio"}
     if ground_factor is None:
         ground_factor, facts["intensity"] = _ground_factor(energy, ground, pulses.first)
     facts["ground_to_canopy_intensity"] = ground_factor

@@ -91,7 +91,8 @@ def _tables(section: Section, prefix: str, title: str) -> Iterator[str]:
         yield "|---|---|---|---|---|"
     for key in plain:
         field, value = fields[key], _scalar(getattr(section, key)).replace("|", "\\|")
-        source = (field.json_schema_extra or {}).get("source", "")
+        told = field.json_schema_extra
+        source = told.get("source", "") if isinstance(told, dict) else ""
         yield f"| `{prefix}{key}` | `{value}` | {_range(field)} | {field.description} | {source} |"
     yield ""
     for key in fields:

@@ -47,5 +47,5 @@ class Optics(Section):
     """Spectra of leaf, bark and meadow."""
 
     leaf: LeafOptics = LeafOptics()
-    bark: Spectrum = Spectrum(**BARK)
-    ground: Spectrum = Spectrum(**MEADOW)
+    bark: Spectrum = Spectrum.model_validate(BARK)
+    ground: Spectrum = Spectrum.model_validate(MEADOW)

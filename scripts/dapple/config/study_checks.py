@@ -108,14 +108,14 @@ def chlorophyll(settings: Settings, where: str) -> None:
                 "Give the stem's diameter in metres.",
             )
     pairs = {"world.lcc_range_ug_cm2": section.world.lcc_range_ug_cm2}
-    for name, value in section.retrieval:
-        if type(section.retrieval).model_fields[name].annotation == GridRange:
-            pairs[f"retrieval.{name}"] = value[:2]
-    for name, (low, high) in pairs.items():
+    for key, value in section.retrieval:
+        if type(section.retrieval).model_fields[key].annotation == GridRange:
+            pairs[f"retrieval.{key}"] = value[:2]
+    for key, (low, high) in pairs.items():
         if low > high:
             raise InputError(
                 where,
-                f"`chlorophyll.{name}` from {low:g} to {high:g}",
+                f"`chlorophyll.{key}` from {low:g} to {high:g}",
                 "the least value before the greatest",
                 "Exchange them.",
             )

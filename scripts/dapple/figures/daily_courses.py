@@ -110,9 +110,11 @@ def _line(own: pd.DataFrame, reconstruction: str, *columns: str) -> list[np.ndar
     # Matplotlib would convert marked times to a zone of its own.
     time = one["time"].dt.tz_convert("UTC").dt.tz_localize(None).to_numpy()
     step = np.diff(time)
-    holes = np.nonzero(step > 3 * np.median(step))[0] + 1 if len(step) else []
+    holes = np.zeros(0, int)
+    if len(step):
+        holes = np.nonzero(step > 3 * np.median(step))[0] + 1
     values = [np.insert(one[name].to_numpy(float), holes, np.nan) for name in columns]
-    return [np.insert(time, holes, time[np.asarray(holes, int)]), *values]
+    return [np.insert(time, holes, time[holes]), *values]
 
 
 def _write_r(axes: Axes, rows: pd.DataFrame, names: tuple[str, ...]) -> None:

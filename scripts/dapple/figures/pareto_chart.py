@@ -1,5 +1,7 @@
 """Accuracy against speed, as a picture and as a page that answers to the mouse."""
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
@@ -24,7 +26,7 @@ LABEL_WIDTH, LABEL_SHIFT = 0.18, 0.03
 
 def groups(points: pd.DataFrame) -> list[tuple[str, str, str, pd.DataFrame]]:
     """Points of one geometry and engine: label, colour, engine, rows by cost."""
-    shades = {}
+    shades: dict[tuple[str, Any], str] = {}
     for kind, palette in (("polygons", POLYGON_SHADES), ("voxels", VOXEL_SHADES)):
         sizes = sorted(points.loc[points["reconstruction"].str.startswith(kind), "size_m"].unique())
         shades |= {(kind, size): palette[k % len(palette)] for k, size in enumerate(sizes)}
@@ -135,7 +137,7 @@ def _label(axes: Axes, labels: list[tuple[str, str, float, float]], points: np.n
     """Names at the dear end of every ladder, moved down to where nothing else is."""
     to_axes = axes.transData + axes.transAxes.inverted()
     taken = to_axes.transform(points)
-    placed = []
+    placed: list[Any] = []
     for label, colour, cost, error in sorted(labels, key=lambda one: -one[3]):
         x, y = to_axes.transform((cost, error))
         x += LABEL_SHIFT

@@ -192,7 +192,7 @@ def _density_norm(voxels: xr.Dataset | None) -> Normalize | None:
     return Normalize(0, top if top > 0 else 1.0)
 
 
-def _voxel_layer(axes: Axes, voxels: xr.Dataset, view: View, norm: Normalize):
+def _voxel_layer(axes: Axes, voxels: xr.Dataset, view: View, norm: Normalize | None):
     area = _columns(voxels, view.depth)
     unknown = np.isnan(_density(voxels)).any(axis=view.depth) & (area == 0)
     half = 0.5 * voxels.attrs["voxel_size_m"]
@@ -233,7 +233,7 @@ def _scanners(axes: Axes, view: View, positions_m: np.ndarray, low, high) -> Non
     rays = positions_m[~inside][:, across_up] - centre
     reach = np.linalg.norm(rays, axis=1)
     far = f"{reach.min():.0f} to {reach.max():.0f} m" if np.ptp(reach) > 1 else f"{reach[0]:.0f} m"
-    label = f"towards a scan position ({far} from the centre)"
+    label: str | None = f"towards a scan position ({far} from the centre)"
     for ray in rays:
         edge = centre + ray * np.min(0.965 * half / np.maximum(np.abs(ray), 1e-9))
         angle = np.degrees(np.arctan2(ray[1], ray[0])) - 90

@@ -50,7 +50,8 @@ def horizontal(path: str | Path, declared: str = "") -> str:
         raise InputError(path, "no file", "a point cloud", "Check the path in the configuration.")
     own = _in_header(path)
     stated = None if not declared else _parse("chlorophyll.crowns.crs", declared)
-    if own is None and stated is None:
+    chosen = own or stated
+    if chosen is None:
         raise InputError(
             path,
             "no coordinate system in the header",
@@ -58,7 +59,6 @@ def horizontal(path: str | Path, declared: str = "") -> str:
             "Write it into the file (pdal translate in.laz out.laz --writers.las.a_srs=EPSG:25832) "
             "or name it as chlorophyll.crowns.crs.",
         )
-    chosen = own or stated
     _check_metres(path, chosen)
     flat = _flat(chosen)
     if own is not None and stated is not None and not flat.equals(_flat(stated), True):

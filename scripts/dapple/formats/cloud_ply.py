@@ -48,7 +48,7 @@ def read(path: Path) -> RawCloud:
         others = [name for name in others if name not in RAY_FIELDS - {"time"}]
         values, xyz = {name: values[name][met] for name in others}, xyz[met]
     names = distinct(attribute_name(name) for name in others)
-    attributes = {}
+    attributes: dict[str, np.ndarray] = {}
     for name, found in zip(others, names, strict=True):
         attributes |= columns(found, values[name])
     source = Source(len(xyz) + sum(left_out.values()), left_out=left_out)

@@ -40,7 +40,7 @@ def read(path: Path) -> RawCloud:
     shots = sum(scan.shots or 0 for scan in facts)
     points = sum(scan.points for scan in facts)
     source = Source(shots, left_out={"shot that met nothing": shots - points}, scans=tuple(facts))
-    if not pieces:
+    if origin is None or not pieces:
         return RawCloud(np.empty((0, 3)), source=source)
     attributes = joined(pieces)
     return RawCloud(attributes.pop("xyz"), origin, attributes, True, source)

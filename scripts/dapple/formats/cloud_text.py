@@ -44,7 +44,7 @@ def read(path: Path) -> RawCloud:
     if scan is not None and "PointSourceId" not in attributes:
         attributes["PointSourceId"] = scan
     xyz = np.stack([columns[name] * factor[axis] for axis, name in enumerate(order)], axis=1)
-    scans = ()
+    scans: tuple[ScanFacts, ...] = ()
     if scan is not None:
         numbers, counts = np.unique(scan, return_counts=True)
         scans = tuple(ScanFacts(int(k), None, int(n)) for k, n in zip(numbers, counts, strict=True))
@@ -116,9 +116,9 @@ def _axes(path: Path, layout: Layout) -> tuple[list[str], np.ndarray, bool]:
     found = [text_layout.axis(name) for name in layout.names]
     factor, degrees = np.ones(3), False
     for axis in range(3):
-        at = next(k for k, one in enumerate(found) if one is not None and one.axis == axis)
+        at, one = next((k, one) for k, one in enumerate(found) if one and one.axis == axis)
         order.append(layout.names[at])
-        factor[axis], degrees = found[at].metres, degrees or found[at].degrees
+        factor[axis], degrees = one.metres, degrees or one.degrees
     return order, factor, degrees
 
 

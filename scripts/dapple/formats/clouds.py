@@ -52,7 +52,7 @@ class Cloud:
     def __len__(self) -> int:
         return len(self.xyz_m)
 
-    def select(self, chosen: np.ndarray) -> "Cloud":
+    def select(self, chosen: np.ndarray | slice) -> "Cloud":
         """The points that a mask or an index array chooses, in the same frame."""
         attributes = {name: values[chosen] for name, values in self.attributes.items()}
         return Cloud(self.xyz_m[chosen], self.origin_m, attributes)

@@ -153,7 +153,7 @@ def _check(path: Path, number: int, feature: dict) -> None:
         )
     lcc = (feature.get("properties") or {}).get("lcc_ug_cm2")
     try:
-        known = 0 < float(lcc) < 200
+        known = lcc is not None and 0 < float(lcc) < 200
     except (TypeError, ValueError):
         known = False
     if not known:

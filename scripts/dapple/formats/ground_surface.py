@@ -49,8 +49,8 @@ class GroundSurface:
         if min(self.z_m.shape) < 2:
             return 0.0
         x, y = np.meshgrid(self.x_m - self.x_m.mean(), self.y_m - self.y_m.mean())
-        rise = [float((axis * self.z_m).sum() / (axis * axis).sum()) for axis in (x, y)]
-        return float(np.hypot(*rise))
+        east, north = (float((axis * self.z_m).sum() / (axis * axis).sum()) for axis in (x, y))
+        return float(np.hypot(east, north))
 
     def height_m(self, xy_m: np.ndarray) -> np.ndarray:
         """(n,) height of the ground at places (n, 2) of the local frame [m]."""

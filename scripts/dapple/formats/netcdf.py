@@ -1,7 +1,8 @@
 """NetCDF datasets with units and names on every variable, and times that say their zone."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -59,7 +60,7 @@ def write(path: str | Path, dataset: xr.Dataset) -> None:
     store(path, dataset, {"time": TIME_ENCODING} if "time" in dataset.coords else {})
 
 
-def store(path: str | Path, dataset: xr.Dataset, encoding: dict[str, dict]) -> None:
+def store(path: str | Path, dataset: xr.Dataset, encoding: Mapping[Any, Mapping[str, Any]]) -> None:
     """Write NetCDF-4 with an encoding of each variable, whole or not at all.
 
     The same dataset gives the same bytes.

@@ -8,6 +8,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -56,7 +57,7 @@ def _hobo(path: Path, lines: Sequence[str]) -> Table | None:
     time = next(name for name in table.cells if re.match(r"Date[ -]Time", name))
     offset = re.search(r"(?:GMT|UTC)\s*([+-]\d{1,2}:?\d{2})?", time)
     zone = (offset[1] or "UTC") if offset else None
-    units = {}
+    units: dict[str, str] = {}
     for name in table.cells:
         unit = re.match(r"^[^,(]+,\s*([^(]+?)\s*(?:\(|$)", name)
         unit = unit or re.match(r"^[^,(]+\(([^:()]+)\)", name)
@@ -161,7 +162,7 @@ def _pvgis(path: Path, lines: Sequence[str]) -> Table | None:
     end = next((k for k in range(header, len(lines)) if not lines[k].strip()), len(lines))
     table = build(path, lines[:end], header=header, delimiter=",", layout="PVGIS")
     time = str(table.cells.columns[0])
-    facts = {"timezone": "UTC", "interval_min": 0.0}
+    facts: dict[str, Any] = {"timezone": "UTC", "interval_min": 0.0}
     if "G(h)" in table.cells:
         known = _there(table, **{"global": "G(h)", "diffuse": "Gd(h)"})
         return replace(table, units=dict.fromkeys(known.values(), "W/m2"),

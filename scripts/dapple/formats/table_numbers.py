@@ -65,7 +65,7 @@ def decimal_sign(cells: pd.DataFrame, column: str, where: str) -> str:
         )
     if not shown:
         others = {sign for name in cells if name != column for sign in _shown(cells[name])[0]}
-        shown = dict.fromkeys(others) if len(others) == 1 else {}
+        shown = dict.fromkeys(others, "") if len(others) == 1 else {}
     # 998, 999, 1,000: a comma only where a thousand is full.
     if shown or not unclear or 0 < largest < 1000:
         return next(iter(shown), ".")

@@ -167,5 +167,5 @@ def _factor(
 def _squeezed(text: str) -> str:
     """A unit without powers' signs, blanks and dots: `µmol m⁻² s⁻¹` is `umolm2s1`."""
     plain = text.strip().lower()
-    plain = plain.translate(str.maketrans({"µ": "u", "μ": "u", "²": "2", "¹": "1", "⁻": ""}))
+    plain = plain.translate(str.maketrans("µμ²¹", "uu21", "⁻"))
     return re.sub(r"[\s/_.·⋅*^()\[\]-]", "", plain)

@@ -1,6 +1,7 @@
 """Voxel grids of plant area density as xarray datasets: NetCDF and AMAPVox's text."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -29,7 +30,7 @@ def write(path: str | Path, dataset: xr.Dataset) -> None:
 
     Coordinates stay float64. The same dataset gives the same bytes.
     """
-    encoding = {}
+    encoding: dict[Any, dict[str, Any]] = {}
     for name, values in dataset.data_vars.items():
         encoding[name] = {"zlib": True, "complevel": 2, "shuffle": True}
         if values.dtype.kind == "f":
@@ -48,7 +49,9 @@ def read(path: str | Path) -> xr.Dataset:
     dataset = netcdf.read(path)
     pad = dataset.get("plant_area_density_m2_m3")
     if pad is None or set(pad.dims) != {"x", "y", "z"} or "voxel_size_m" not in dataset.attrs:
-        raise InputError(path, f"variables {', '.join(dataset.data_vars)}", _EXPECTED, _REMEDY)
+        raise InputError(
+            path, f"variables {', '.join(map(str, dataset.data_vars))}", _EXPECTED, _REMEDY
+        )
     return dataset
 
 
@@ -122,7 +125,8 @@ def read_vox(path: str | Path) -> xr.Dataset:
     expected = "an AMAPVox voxel file (`VOXEL SPACE`, `#key:value` lines, a table)"
     if not path.is_file():
         raise InputError(path, "no file", expected, "Check the path.")
-    head, n_head = {}, 1
+    head: dict[str, str] = {}
+    n_head = 1
     with path.open(encoding="utf-8", errors="replace") as file:
         first = file.readline().strip()
         while (line := file.readline()).startswith("#"):

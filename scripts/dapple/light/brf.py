@@ -95,6 +95,7 @@ def over_cell(
     cosine : bool
         See `Views`.
     """
+    assert scene.cell is not None
     low, high = (np.array([corner.x[0], corner.y[0]]) for corner in scene.cell)
     z = float(scene.top_z[0]) + 1.0 if height_m is None else height_m
     shape = (len(directions), 3)
@@ -246,7 +247,7 @@ def follow(
     sun_direction: np.ndarray,
     max_orders: int,
     halved_after: int,
-) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray]]:
+) -> Iterator[tuple[np.ndarray, np.ndarray | None, np.ndarray | None, np.ndarray]]:
     """Follow paths surface by surface and give what they bring at each.
 
     Paths that have ended are left out after every surface: few go on for long.

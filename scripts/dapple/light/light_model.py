@@ -115,7 +115,8 @@ def simplified(sky: xr.Dataset, optics: Optics, model: Model) -> tuple[xr.Datase
         optics = optics.with_black(GROUND)
     if model.bands < len(optics):
         flux = {name: sky[name].transpose("time", "band").to_numpy() for name in FLUXES}
-        optics, group = group_bands(optics, *flux.values(), model.bands)
+        direct, diffuse = flux.values()
+        optics, group = group_bands(optics, direct, diffuse, model.bands)
         sky = sky.drop_dims("band").assign(
             {
                 name: (("time", "band"), group_flux(values, group, model.bands))

@@ -118,9 +118,9 @@ def mean(placements: Sequence[Light]) -> Light:
     """
     if len(placements) == 1:
         return placements[0]
-    parts = (
+    direct, sky, scattered = (
         np.mean([getattr(p, part) for p in placements], axis=0)
         for part in ("direct", "sky", "scattered")
     )
     spread = np.std([p.par for p in placements], axis=0, ddof=1)
-    return Light(*parts, standard_error=spread / np.sqrt(len(placements)))
+    return Light(direct, sky, scattered, standard_error=spread / np.sqrt(len(placements)))

@@ -264,7 +264,7 @@ def _by_kind(transport: Transport, radiance: np.ndarray):
                 (weight, (row, transport.patch[rows])),
                 shape=(n_replicates * len(mine), transport.n_patches),
             )
-            yield sensor, mine, (counted @ by_patch).reshape(n_replicates, len(mine), -1)
+            yield int(sensor), mine, (counted @ by_patch).reshape(n_replicates, len(mine), -1)
 
     return transport.counters.unpacked(kinds), pieces()
 

@@ -13,6 +13,7 @@ asked along rays that start at the sensor:
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
@@ -240,7 +241,7 @@ def _across(axis: np.ndarray) -> np.ndarray:
 def _summary(parts: dict[str, np.ndarray], n_bands: int) -> dict[str, np.ndarray]:
     """Means over replicates per sensor and band, and the standard errors of the totals."""
     parts = {name: values[..., :n_bands] for name, values in parts.items()}
-    total = sum(parts.values())
+    total = reduce(np.add, parts.values())
     root = np.sqrt(total.shape[1])
     par = total.sum(axis=-1)
     return {

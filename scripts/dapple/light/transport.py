@@ -5,6 +5,7 @@ What comes out serves every sky, spectrum and time (`dapple.light.tensor`).
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -116,6 +117,7 @@ def collect(
         return more if counted is None else _added(counted, more)
 
     def scattered_error(counted: Transport) -> np.ndarray:
+        assert growth is not None  # only then it is asked
         return nominal_error(counted, growth.optics, sun_kernel_deg=growth.sun_kernel_deg)
 
     n = len(sensors_m)
@@ -190,7 +192,7 @@ def _summed(key: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 def _added(first: Transport, second: Transport) -> Transport:
     """Counts of both, in the order of `_tallied`."""
-    columns = {
+    columns: dict[str, Any] = {
         name: np.concatenate([getattr(first, name), getattr(second, name)])
         for name in ("sensor", "replicate", "patch", "orders", "count")
     }
@@ -200,7 +202,7 @@ def _added(first: Transport, second: Transport) -> Transport:
     _, index = np.unique(key, return_index=True)
     columns = {name: values[index] for name, values in columns.items()}
     columns["count"] = _summed(key, np.concatenate([first.count, second.count]))[1]
-    same = {
+    same: dict[str, Any] = {
         field.name: getattr(first, field.name)
         for field in fields(Transport)
         if field.name not in columns

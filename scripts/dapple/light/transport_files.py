@@ -1,7 +1,9 @@
 """NetCDF of counted paths."""
 
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from dapple.formats import netcdf
@@ -24,7 +26,7 @@ SKY = "share of the sky patch that the sensor sees, weighted by the cosine"
 
 def write(path: str | Path, transport: Transport) -> None:
     """Write counted paths, whole or not at all; the same counts give the same bytes."""
-    variables = {
+    variables: dict[str, tuple[Any, np.ndarray, dict[str, str]]] = {
         name: (
             ("row", "order") if name == "orders" else "row",
             getattr(transport, name),

@@ -78,7 +78,9 @@ def read(
         shares of light nor percent; a leaf that gives back more light than it gets.
     """
     source = user_tables.read(path, decimal=decimal)
-    names = {"reflectance": (reflectance_column, REFLECTANCE_NAMES)}
+    names: dict[str, tuple[str, tuple[str, ...]]] = {
+        "reflectance": (reflectance_column, REFLECTANCE_NAMES)
+    }
     if with_transmittance:
         names["transmittance"] = (transmittance_column, TRANSMITTANCE_NAMES)
     at_name = _column(source, wavelength_column, WAVELENGTH_NAMES, f"{key}.wavelength_column")

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -55,7 +56,7 @@ def reflectance(
     if isinstance(source, Mapping):
         table = _table(source, where)
     else:
-        value = float(source)  # type: ignore[arg-type]
+        value = float(source)
         table = pd.Series(value, index=[wavelength_nm[0] - 1.0, wavelength_nm[-1] + 1.0])
     wrong = ~table.between(0.0, 1.0)
     if wrong.any():
@@ -81,7 +82,7 @@ def of_file(
     wavelength_nm: np.ndarray,
     where: str,
     noticed: list[Finding] | None = None,
-    **columns: str,
+    **columns: Any,
 ) -> np.ndarray:
     """Reflectance (b,) per band from a file; see `reflectance`."""
     spectrum = spectrum_table.read(

@@ -115,7 +115,10 @@ def split(
     if by == "time":
         chosen[:n_fit] = True
         last, first = times[n_fit - 1], times[n_fit]
-        words = f"times up to {last:%Y-%m-%d %H:%M %Z}", f"times from {first:%Y-%m-%d %H:%M %Z}"
+        words: tuple[str, ...] = (
+            f"times up to {last:%Y-%m-%d %H:%M %Z}",
+            f"times from {first:%Y-%m-%d %H:%M %Z}",
+        )
         fitting = np.broadcast_to(chosen, (len(sensors), n)).copy()
     else:
         chosen[np.random.default_rng(seed).permutation(n)[:n_fit]] = True
@@ -318,5 +321,6 @@ def _registration(scores, centre, shift_range_m, clock_range_s, n_fit) -> Regist
     at_edge = tuple(
         name for name, (value, half) in limits.items() if half > 0 and abs(value) >= half - 1e-6
     )
-    values = (float(best[name]) for name in limits)
-    return Registration(*values, float(best["r"]), n_fit, at_edge, scores.astype({"level": int}))
+    east_m, north_m, offset_s = (float(best[name]) for name in limits)
+    tried = scores.astype({"level": int})
+    return Registration(east_m, north_m, offset_s, float(best["r"]), n_fit, at_edge, tried)

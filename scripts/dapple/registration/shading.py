@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -77,8 +78,8 @@ def register(
     sun = towards_sun(sky)
     beam = level_beam(sky)
     diffuse = sky["diffuse_horizontal_umol_m2_s"].sum("band").to_numpy()
-    disc = {"n_disc": N_DISC, "sun_diameter_deg": sun_diameter_deg, "aperture_m": aperture_m}
-    disc["seed"] = seed
+    disc: dict[str, Any] = {"n_disc": N_DISC, "seed": seed}
+    disc |= {"sun_diameter_deg": sun_diameter_deg, "aperture_m": aperture_m}
     tracers = [rays_to_sky.Tracer(scene, variant) for scene in scenes]
 
     def seen(shifts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,6 +1,7 @@
 """NetCDF of simulated images: what was traced per pixel, and the fit of Semi-LESS."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -43,7 +44,7 @@ def read(path: str | Path) -> Coefficients:
     """
     dataset = netcdf.read(path, [*TABLES], [*NUMBERS, *KINDS, *WINDOW])
     numbers = {name: dataset.attrs[name].item() for name in NUMBERS}
-    tables = {name: dataset[name].to_numpy() for name in TABLES}
+    tables: dict[str, Any] = {name: dataset[name].to_numpy() for name in TABLES}
     counters = Counters.from_attributes(dataset.attrs)
     return Coefficients(window=_window(dataset), counters=counters, **tables, **numbers)
 
@@ -76,7 +77,7 @@ def read_semiless(path: str | Path) -> Fitted:
 def _write(path: str | Path, variables: dict, window: Window, attributes: dict) -> None:
     attributes = attributes | {name: getattr(window, name) for name in WINDOW}
     dataset = xr.Dataset(variables, attrs=attributes)
-    encoding = {}
+    encoding: dict[Any, dict[str, Any]] = {}
     for name, variable in dataset.data_vars.items():
         sizes = zip(variable.dims, variable.shape, strict=True)
         chunks = [min(n, CHUNK_PIXELS) if dim == "pixel" else n for dim, n in sizes]

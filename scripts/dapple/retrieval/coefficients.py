@@ -14,6 +14,7 @@ approximation, single pixels have one far below the noise of their paths.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from operator import itemgetter
 
 import numpy as np
 
@@ -146,8 +147,11 @@ def images(
     (b, rows, columns) float32
         Reflectance factor: the ratio to a level white Lambertian plate in the open.
     """
-    optics = (np.asarray(x)[None] for x in (leaf_reflectance, leaf_transmittance, bark, soil))
-    values = coefficients.table @ spectral_columns(coefficients, *optics, diffuse_share)[:, 0]
+    rho, tau, wood, ground = (
+        np.asarray(x)[None] for x in (leaf_reflectance, leaf_transmittance, bark, soil)
+    )
+    columns = spectral_columns(coefficients, rho, tau, wood, ground, diffuse_share)[:, 0]
+    values = coefficients.table @ columns
     return np.ascontiguousarray(values.T).reshape(-1, *coefficients.shape)
 
 
@@ -207,7 +211,7 @@ def spectral_columns(
     for low in range(0, len(optics), COMBINATIONS_AT_ONCE):
         part = slice(low, low + COMBINATIONS_AT_ONCE)
         factor = coefficients.counters.spectral_factor(
-            coefficients.orders, optics.each(lambda values, part=part: values[part])
+            coefficients.orders, optics.each(itemgetter(part))
         )
         for source in (SUN, SKY):
             weight[source, :, part] = coefficients.projectors[source] @ factor

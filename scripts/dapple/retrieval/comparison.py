@@ -79,9 +79,9 @@ def of_chunks(chunks, window: Window, cell_m: float) -> Means:
     """Means of many combinations from images in chunks of pixels; their noise is not known."""
     cell, n_cells = window.cells(cell_m)
     pixels = np.bincount(cell, minlength=n_cells)
-    sums = None
+    sums = np.zeros(0)
     for rows, values in chunks:
-        if sums is None:
+        if not len(sums):
             sums = np.zeros((n_cells, *values.shape[1:]))
         here, place = np.unique(cell[rows], return_inverse=True)
         for k, one in enumerate(here):

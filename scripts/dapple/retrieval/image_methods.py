@@ -29,7 +29,7 @@ def render_all(
     properties: Spectra,
     *,
     towards_sun: np.ndarray,
-    bark: Sequence[float],
+    bark: np.ndarray,
     diffuse_share: np.ndarray,
     n_paths: int,
     seed: int,
@@ -91,7 +91,7 @@ class FastImages:
         self,
         traced: Coefficients,
         fitted: Fitted,
-        bark: Sequence[float],
+        bark: np.ndarray,
         diffuse_share: np.ndarray,
     ):
         self.traced, self.fitted = traced, fitted

@@ -1,5 +1,7 @@
 """Trace the light of every pixel of an orthographic image, seen straight from above."""
 
+from typing import Any
+
 import drjit as dr
 import numpy as np
 import pandas as pd
@@ -119,7 +121,7 @@ class _Kinds:
         self.counters = counters
         self.keys = np.empty(0, counters.word)
         self.light = np.empty((2, 0))
-        self._values = None
+        self._values: np.ndarray | None = None
 
     def count(self, found):
         """Starts, kinds, sources and light of what paths bring, and the weight of those given up.
@@ -150,8 +152,9 @@ class _Kinds:
         """(k, r) the functions of all kinds met so far."""
         done = 0 if self._values is None else len(self._values)
         new = functions.of(self.counters.unpacked(self.keys[done:]))
-        self._values = new if done == 0 else np.concatenate([self._values, new])
-        return self._values
+        values = new if self._values is None else np.concatenate([self._values, new])
+        self._values = values
+        return values
 
 
 def _pilot(scene, window: Window, sun_direction, limits, n_columns: int, seed: int) -> basis.Basis:
@@ -172,7 +175,9 @@ def _pilot(scene, window: Window, sun_direction, limits, n_columns: int, seed: i
     return basis.fit(orders, light[order], scene.counters, n_columns, seed)
 
 
-def _starts(scene, window: Window, pixels, per_set: int, n_replicates: int, seed: int):
+def _starts(
+    scene, window: Window, pixels, per_set: int, n_replicates: int, seed: int
+) -> tuple[Any, Any, Any, Any]:
     """Labels (pixel and replicate), first rays and random numbers of the paths of some pixels.
 
     They are spread evenly over each pixel by shifted R2 sequences.

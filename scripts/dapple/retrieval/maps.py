@@ -17,7 +17,7 @@ def shape_of(raster: Raster, pixel_m: float) -> tuple[int, int]:
     """Rows and columns of pixels of another size that cover a raster from its corner."""
     _, rows, columns = raster.values.shape
     size = raster.pixel_m / pixel_m
-    return tuple(int(np.ceil(n * size - _HAIR)) for n in (rows, columns))
+    return int(np.ceil(rows * size - _HAIR)), int(np.ceil(columns * size - _HAIR))
 
 
 def resample(

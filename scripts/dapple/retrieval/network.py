@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -265,10 +266,13 @@ def _scaled_prediction(weights: Weights, x: np.ndarray, block: int, chunk: int =
 
 def write(path: str | Path, network: Network) -> None:
     """Write a network as a NumPy archive."""
-    arrays = {"feature_mean": network.feature_mean, "feature_scale": network.feature_scale}
+    arrays: dict[str, Any] = {
+        "feature_mean": network.feature_mean,
+        "feature_scale": network.feature_scale,
+    }
     for layer, (matrix, offset) in enumerate(network.weights):
         arrays[f"matrix_{layer}"], arrays[f"offset_{layer}"] = matrix, offset
-    scalars = {"block": network.block, "low": network.low, "high": network.high}
+    scalars: dict[str, Any] = {"block": network.block, "low": network.low, "high": network.high}
     with atomic(path) as partial:
         np.savez(partial, **arrays, **scalars)
 

@@ -136,7 +136,7 @@ def fit(
     terms = np.empty((2, 4, degree + 1, len(coefficients.table)), np.float32)
     for source in (SUN, SKY):
         chunks = collision.image_chunks(
-            coefficients, *leaves, bark, ground, [float(source == SKY)],
+            coefficients, *leaves, np.array(bark), ground, np.array([float(source == SKY)]),
             pixels_per_chunk=pixels_per_chunk,
         )  # fmt: skip
         for pixels, values in chunks:
@@ -244,6 +244,7 @@ def image_chunks(
         value = np.zeros((pixels.stop - low, len(flat)), np.float32)
         for source, part in ((SUN, 1 - share), (SKY, share)):
             if part.any():
-                four = (term[:, pixels].T @ powers for term in fitted.terms[source])
-                value += part * formula(*four, flat)
+                terms = (term[:, pixels].T @ powers for term in fitted.terms[source])
+                rho_so, t1, rho_dd, rho_dd_t2 = terms
+                value += part * formula(rho_so, t1, rho_dd, rho_dd_t2, flat)
         yield pixels, value.reshape(-1, *rho.shape)

@@ -1,6 +1,8 @@
 """From leaf and soil parameters to reflectance and transmittance in the camera's bands."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -24,7 +26,7 @@ class Spectra:
 
 
 def combinations(
-    settings: dict, number: int, camera: Camera, *, seed: int, **fixed: float
+    settings: Mapping[str, Any], number: int, camera: Camera, *, seed: int, **fixed: float
 ) -> tuple[pd.DataFrame, Spectra]:
     """Draw combinations of leaf and soil, and compute their spectra.
 

@@ -127,7 +127,7 @@ def aggregate(
             break
         done = pixels.stop
         _add(values, flat[pixels], over.of_pixel[pixels], near_infrared, thresholds, sums, count)
-    if sums is None or done != len(flat) or len(over.of_pixel) != len(flat):
+    if sums is None or count is None or done != len(flat) or len(over.of_pixel) != len(flat):
         raise InputError(
             "images", f"{done} pixels", f"the {len(flat)} of the canopy mask, in their order",
             "Make images and canopy mask on one grid.",

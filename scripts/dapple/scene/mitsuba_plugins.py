@@ -1,6 +1,7 @@
 """What Mitsuba lacks: leaves that reflect and transmit diffusely, and a medium of such leaves."""
 
 from functools import cache
+from typing import Any
 
 import drjit as dr
 import mitsuba
@@ -29,7 +30,7 @@ def _split(reflectance, transmittance):
 
 @cache
 def _leaf_class(variant: str) -> type:
-    mi = mitsuba
+    mi: Any = mitsuba
 
     class BiLambertian(mi.BSDF):
         """Both faces reflect `reflectance` and transmit `transmittance`, both as cosine lobes."""
@@ -100,9 +101,11 @@ def _leaf_class(variant: str) -> type:
 
 
 def _painted_class(variant: str) -> type:
-    mi = mitsuba
+    mi: Any = mitsuba
 
-    class Painted(_leaf_class(variant)):
+    leaf_class: Any = _leaf_class(variant)
+
+    class Painted(leaf_class):
         """Bi-Lambertian like `bilambertian`, but every triangle of a mesh has its own material."""
 
         def __init__(self, props):
@@ -132,7 +135,7 @@ def _painted_class(variant: str) -> type:
 
 
 def _phase_class(variant: str) -> type:
-    mi = mitsuba
+    mi: Any = mitsuba
 
     class LeafPhase(mi.PhaseFunction):
         """Phase function of `dapple.scene.phase`, with a reflected share of its own in each band.

@@ -190,7 +190,7 @@ def leaf_shares(optics: Optics, name: str) -> tuple[list[float], list[float]]:
         for values in (optics.reflectance_of(name), optics.transmittance_of(name))
     ]
     for what, share in zip(
-        ("reflectance", "transmittance", "albedo"), (*shares, sum(shares)), strict=True
+        ("reflectance", "transmittance", "albedo"), (*shares, shares[0] + shares[1]), strict=True
     ):
         _check_share(f"{name} {what}", share)
     return tuple(np.minimum(share, 1.0).tolist() for share in shares)

@@ -240,7 +240,7 @@ def _least_variance_groups(value: np.ndarray, weight: np.ndarray, n: int) -> np.
         np.concatenate([[0.0], np.cumsum(weight * value**power)]) for power in range(3)
     )
     index = np.arange(len(value))
-    best, best_cost = None, np.inf
+    best, best_cost = np.zeros(n + 1, int), np.inf
     for cuts in combinations(range(1, len(value)), n - 1):
         edges = np.array([0, *cuts, len(value)])
         mass, moment = np.diff(zeroth[edges]), np.diff(first[edges])

@@ -120,7 +120,9 @@ class Scene:
         for surface in sorted(self.filled, key=lambda one: order.reflected(one.optics)):
             at = surface.places_m
             for places, together in found:
-                if (places is None) == (at is None) and np.array_equal(places, at):
+                if places is at or (
+                    places is not None and at is not None and np.array_equal(places, at)
+                ):
                     together.append(surface)
                     break
             else:

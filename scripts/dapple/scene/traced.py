@@ -1,6 +1,7 @@
 """A scene as rays see it: Mitsuba's meshes, an endless ground, turbid voxels."""
 
 from types import ModuleType
+from typing import Any
 
 import drjit as dr
 import mitsuba
@@ -46,10 +47,12 @@ class TracedScene:
         The ground plan that is repeated sideways without end.
     """
 
-    def __init__(self, variant: str, scene: Scene, meshes, grid, box_m, cell_m):
+    def __init__(
+        self, variant: str, scene: Scene, meshes: tuple[Any, Any, Any], grid, box_m, cell_m
+    ):
         self.variant, self.grid, self.counters = variant, grid, scene.counters
         mi = self.mi
-        self.meshes, self.triangles, self.first = meshes or (None, None, None)
+        self.meshes, self.triangles, self.first = meshes
         # Opaque numbers stay out of the kernel's code: one kernel serves all scenes.
         leaves = self.counters.leaves
         self.of_voxels, self.of_ground, self.n_leaf = (
@@ -253,7 +256,7 @@ def load(
     cell = None if cell_m is None else np.asarray(cell_m, np.float64)
     _check_cell(grid, cell)
     boxes = [] if grid is None else [np.array([grid.low_m, grid.high_m])]
-    meshes = None
+    meshes: tuple[Any, Any, Any] = (None, None, None)
     if together := scene.plants:
         meshes, box = _load_plants(mi, together, scene.counters, cell)
         boxes.append(box)

@@ -110,15 +110,14 @@ def clear_sky(
     """
     times = utc(times)
     zenith = position(times, *site.place)["sun_zenith_deg"].to_numpy()
-    if linke_turbidity is None:
-        linke_turbidity = _monthly_turbidity(times, site)
+    turbidity = _monthly_turbidity(times, site) if linke_turbidity is None else linke_turbidity
     pressure = pvlib.atmosphere.alt2pres(site.altitude_m)
     above = np.minimum(zenith, 89.9)  # at the horizon itself the model divides by zero
     airmass = pvlib.atmosphere.get_relative_airmass(above)
     model = pvlib.clearsky.ineichen(
         above,
         pvlib.atmosphere.get_absolute_airmass(airmass, pressure),
-        linke_turbidity,
+        turbidity,
         altitude=site.altitude_m,
         dni_extra=extraterrestrial(times),
     )

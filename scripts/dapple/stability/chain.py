@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -181,7 +182,7 @@ class Chain:
         """Its scenes as rays meet them."""
         variant = self.setup.light["variant"]
         return [
-            self._step(f"loaded {name} {k}", conditions, lambda s=scene: traced.load(s, variant))
+            self._step(f"loaded {name} {k}", conditions, partial(traced.load, scene, variant))
             for k, scene in enumerate(self.structure(name, conditions).scenes)
         ]
 

@@ -135,7 +135,7 @@ def class_scores(chain: Chain, conditions: Conditions) -> dict[str, float]:
         "_threshold": chain.classified(conditions, "reflectance"),
         "_geometry": chain.classified(conditions, "geometry"),
     }
-    found = {}
+    found: dict[str, float] = {}
     for suffix, cloud in clouds.items():
         scored = scores(cloud.attributes["Classification"], cloud.attributes["TrueClass"])
         found |= {f"f1_{kind}{suffix}": scored[kind]["f1"] for kind in ("leaf", "wood")}

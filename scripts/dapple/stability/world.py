@@ -312,7 +312,7 @@ def with_noise(shots: Shots, share: float, ground_z_m: float, rng: np.random.Gen
     return replace(shots, first=np.concatenate([[0], np.cumsum(count)]), **columns)
 
 
-def _returns(shots: Shots, index: np.ndarray) -> dict[str, np.ndarray | None]:
+def _returns(shots: Shots, index: np.ndarray) -> dict[str, Any]:
     names = ("range_m", "reflectance_db", "deviation", "truth")
     values = {name: getattr(shots, name) for name in names}
     return {name: None if v is None else v[index] for name, v in values.items()}
@@ -335,7 +335,7 @@ def sensors_m(setup: Setup, conditions: Conditions) -> np.ndarray:
         away = np.radians(sun["sun_azimuth_deg"] + 180)
         length_m = middle_m * np.tan(np.radians(sun["sun_zenith_deg"]))
         centre = length_m * np.array([np.sin(away), np.cos(away)])
-    table = sensors.grid_around(centre, **setup.sensors, ground=flat(setup.ground_z_m))
+    table = sensors.grid_around(centre.tolist(), **setup.sensors, ground=flat(setup.ground_z_m))
     return table[["x_m", "y_m", "z_m"]].to_numpy(float)
 
 

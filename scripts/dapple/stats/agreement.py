@@ -46,8 +46,8 @@ def compare(
     fast, reference, open_sky = xr.align(fast, reference, open_sky_umol_m2_s, join="inner")
     difference = (fast[PAR] - reference[PAR]).transpose("sensor", "time").to_numpy()
     variance = fast[ERROR] ** 2 + reference[ERROR] ** 2
-    sigma = np.sqrt(variance + (float_resolution * open_sky) ** 2)
-    sigma = sigma.transpose("sensor", "time").to_numpy()
+    variance = variance + (float_resolution * open_sky) ** 2
+    sigma = np.sqrt(variance.transpose("sensor", "time").to_numpy())
     scale = np.broadcast_to(open_sky.to_numpy(), difference.shape)
     known = np.isfinite(difference)
     if not known.any():

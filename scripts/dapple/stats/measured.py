@@ -186,8 +186,10 @@ def _long(
 ) -> tuple[pd.DataFrame, dict[str, Numbers]]:
     """One row a record: `line`, `sensor`, `column`, `par_umol_m2_s`; and the columns read."""
     flags = (*LIGHT_FLAGS, *missing)
-    sensor = sensor_column and source.require([sensor_column], "measured.sensor_column")
-    sensor = sensor or source.find(SENSOR_NAMES)
+    if sensor_column:
+        sensor: str | None = source.require([sensor_column], "measured.sensor_column")
+    else:
+        sensor = source.find(SENSOR_NAMES)
     logger, channel = source.find(["logger"]), source.find(["channel"])
     if sensor or (logger and channel):
         names = [par_column] if par_column else [*PAR_NAMES]

@@ -1,5 +1,7 @@
 """Where scanners stand."""
 
+from collections.abc import Sequence
+
 from dapple.errors import InputError
 
 Position = tuple[float, float, float]
@@ -59,7 +61,7 @@ def positions(
     return [(x, y, height_m) for x, y in places]
 
 
-def candidates(size_m: tuple[float, float, float], height_m: float, along: int) -> list[Position]:
+def candidates(size_m: Sequence[float], height_m: float, along: int) -> list[Position]:
     """A square grid of `along` x `along` places from edge to edge [m]."""
     x, y = ([edge * k / (along - 1) for k in range(along)] for edge in size_m[:2])
     return [(east, north, height_m) for east in x for north in y]

@@ -1,6 +1,7 @@
 """Grids of a scan survey: what voxels truly hold, and which beams reached them."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -13,7 +14,8 @@ def write(path: str | Path, grids: dict[str, np.ndarray], **attributes) -> None:
     dataset = xr.Dataset(
         {name: (("x", "y", "z"), values) for name, values in grids.items()}, attrs=attributes
     )
-    encoding = {name: {"zlib": True, "complevel": 1} for name in grids}
+    packed: dict[str, Any] = {"zlib": True, "complevel": 1}
+    encoding = {name: dict(packed) for name in grids}
     for name, values in grids.items():
         if values.dtype.kind == "f":
             encoding[name]["dtype"] = "float32"

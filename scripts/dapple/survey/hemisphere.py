@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 from numba import njit, prange
@@ -64,7 +65,7 @@ def world_of(stand: Stand) -> World:
     """The stand as a scene in which every tree that was grown is stored once."""
     mi: ModuleType = engine.load()
     centre = np.append(0.5 * stand.size_m[:2], 0.0)
-    scene = {"type": "scene"}
+    scene: dict[str, Any] = {"type": "scene"}
     for k, plant in enumerate(stand.plants):
         mesh = mitsuba_mesh(mi, concatenate([plant.leaves, plant.wood]), np.zeros(3))
         scene[f"plant_{k}"] = {"type": "shapegroup", "mesh": mesh}

@@ -244,7 +244,7 @@ def places(
     """
     size_m = np.array(density_m2_m3.shape) * cell_size_m
     height_m = float(scanned_m[:, 2].mean()) if len(scanned_m) else height_m
-    grid_m = np.array(candidates(size_m, height_m, along))
+    grid_m = np.array(candidates(size_m.tolist(), height_m, along))
     index = np.clip((grid_m / cell_size_m).astype(int), 0, np.array(density_m2_m3.shape) - 1)
     free = density_m2_m3[tuple(index.T)] <= densest_m2_m3
     between = np.linalg.norm(grid_m[:, None, :2] - scanned_m[None, :, :2], axis=-1)

@@ -1,6 +1,7 @@
 """Which signals go with losses: learned from stress runs, tried on others."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -196,7 +197,7 @@ def flagged(runs: pd.DataFrame, models: dict[str, dict]) -> np.ndarray:
     return (expected_loss(runs, models) >= amber.to_numpy(float)) | ~has_run(runs)
 
 
-def cross_flagged(points: pd.DataFrame, *, seed: int = 0, **settings: float) -> np.ndarray:
+def cross_flagged(points: pd.DataFrame, *, seed: int = 0, **settings: Any) -> np.ndarray:
     """(n,) bool: each half of the runs judged by models that were fitted to the other half.
 
     Parameters
@@ -248,7 +249,7 @@ def rates(runs: pd.DataFrame, alarm: np.ndarray) -> dict[str, float]:
 
 
 def validate(
-    points: pd.DataFrame, *, seed: int = 0, with_records: bool = False, **settings: float
+    points: pd.DataFrame, *, seed: int = 0, with_records: bool = False, **settings: Any
 ) -> dict[str, dict]:
     """Fit on a half, judge the other, both ways; and leave out one stressor after the other.
 
@@ -276,7 +277,7 @@ def validate(
     for stressor in runs["stressor"].unique():
         own = (runs["stressor"] == stressor).to_numpy()
         unseen[own] = flagged(runs[own], fit(runs[~own], **settings))
-    found = {"halves": rates(runs, halves), "unseen_stressor": rates(runs, unseen)}
+    found: dict[str, Any] = {"halves": rates(runs, halves), "unseen_stressor": rates(runs, unseen)}
     for column in ("reconstruction", "stressor"):
         found[f"by_{column}"] = {
             str(key): rates(rows, halves[rows.index]) for key, rows in runs.groupby(column)

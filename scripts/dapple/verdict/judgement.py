@@ -7,6 +7,7 @@ alone, and one for runs that have records of light as well, which show wrong clo
 
 import math
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -114,7 +115,7 @@ def load(path: Path = MODEL, *, with_records: bool = False) -> dict[str, dict]:
     return json.read(path)["records" if with_records else "scan"]["models"]
 
 
-def store(path: Path, points: pd.DataFrame, **settings: float) -> dict:
+def store(path: Path, points: pd.DataFrame, **settings: Any) -> dict:
     """Fit models to all stress runs and store them with the rates on runs they were not fitted to.
 
     Returns

@@ -51,10 +51,10 @@ def _of_scan(run: RunData, fine: xr.Dataset | None) -> dict[str, float]:
     if fine is not None:
         coverage["shots_per_voxel"] = signals_scan.shots_per_voxel(fine)
         coverage["unknown_share"] = signals_scan.unknown_share(fine)
-        if run.sensors_m is not None and run.sun_zenith_deg is not None:
-            unknown, seen = signals_scan.on_sun_beams(
-                fine, run.sensors_m, run.sun_zenith_deg, run.sun_azimuth_deg, rng
-            )
+        sensors_m = run.sensors_m
+        zenith_deg, azimuth_deg = run.sun_zenith_deg, run.sun_azimuth_deg
+        if sensors_m is not None and zenith_deg is not None and azimuth_deg is not None:
+            unknown, seen = signals_scan.on_sun_beams(fine, sensors_m, zenith_deg, azimuth_deg, rng)
             coverage |= {"unknown_on_sun_beams": unknown, "seen_on_sun_beams": seen}
         else:
             # Light may come from anywhere: what holds for the crown holds for its way, on average.

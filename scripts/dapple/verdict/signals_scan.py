@@ -277,7 +277,7 @@ def _parting(values: np.ndarray, leaf: np.ndarray) -> float:
     return float(values[order][np.argmin(wrong)])
 
 
-def _normal(x: np.ndarray, mean: np.ndarray, sd: np.ndarray) -> np.ndarray:
+def _normal(x: np.ndarray, mean: np.ndarray | float, sd: np.ndarray | float) -> np.ndarray:
     return np.exp(-0.5 * ((x - mean) / sd) ** 2) / (sd * math.sqrt(2 * math.pi))
 
 

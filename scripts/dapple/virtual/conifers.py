@@ -187,7 +187,9 @@ def grow(
     return tree
 
 
-def _grow(habit, height_m, base_m, radius_m, dbh_m, n_shoots, shoot, rng) -> Conifer:
+def _grow(
+    habit, height_m, base_m, radius_m, dbh_m, n_shoots, shoot: tuple[float, float, int], rng
+) -> Conifer:
     stem = _stem(height_m, dbh_m, rng)
     branches = _branches(habit, stem, height_m, base_m, radius_m, rng)
     twigs = _twigs(habit, branches, rng)

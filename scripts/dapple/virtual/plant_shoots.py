@@ -88,8 +88,8 @@ def sprout(
         np.concatenate([long_wood.radius_m, spur_wood.radius_m]),
         np.concatenate([long_wood.axis, spur_wood.axis + len(tips)]),
     )
-    sites = (np.concatenate(pair) for pair in zip(long_sites, spur_sites, strict=True))
-    return Shoots(wood, *sites, len(tips), n_spurs)
+    base_m, petiole = (np.concatenate(pair) for pair in zip(long_sites, spur_sites, strict=True))
+    return Shoots(wood, base_m, petiole, len(tips), n_spurs)
 
 
 def _places_on_thin_wood(skeleton, radius_m, n, rng):

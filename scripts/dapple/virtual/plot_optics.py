@@ -57,8 +57,8 @@ def chlorophyll(
 
 def layers(leaves: Mesh, n_layers: int) -> np.ndarray:
     """Height layer (n_elements,) of every shoot of a tree: equally deep, 0 the lowest."""
-    height = np.bincount(leaves.element, leaves.vertices_m[leaves.faces, 2].mean(axis=1))
-    height /= np.bincount(leaves.element)
+    total = np.bincount(leaves.element, leaves.vertices_m[leaves.faces, 2].mean(axis=1))
+    height = total / np.bincount(leaves.element)
     share = (height - height.min()) / max(np.ptp(height), 1e-9)
     return np.minimum((share * n_layers).astype(np.int32), n_layers - 1)
 
@@ -112,7 +112,8 @@ def needles(
 
 def in_bands(spectrum: Mapping[str, Sequence[float]], camera: Camera) -> np.ndarray:
     """A spectrum of `optics.default_spectra` in the bands of a camera (b,)."""
-    return camera_mean(spectrum["wavelength_nm"], spectrum["reflectance"], camera)
+    wavelength_nm, reflectance = (np.array(spectrum[k]) for k in ("wavelength_nm", "reflectance"))
+    return camera_mean(wavelength_nm, reflectance, camera)
 
 
 def ground_patches(

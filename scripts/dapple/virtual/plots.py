@@ -1,6 +1,7 @@
 """Plots of virtual conifers: where trees stand, how large they are, and what they cover."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -136,7 +137,8 @@ def plant(
     rng = np.random.default_rng(seed)
     radius = np.sqrt([area_m2(ring) / np.pi for ring in outlines])
     low, high = -margin_m, np.asarray(size_m) + margin_m
-    rows, covered = [], _covered([], size_m)
+    rows: list[Any] = []
+    covered = _covered([], size_m)
     while covered.mean() < cover_share:
         height_m, radius_m = sizes.draw(rng)
         place = _free_place(rows, radius_m, low, high, core_share, rng)

@@ -178,4 +178,5 @@ def _chunks_of_beams(
                 (indices[len(indices) - n_waiting :], directions[len(indices) - n_waiting :])
             ]
     if n_waiting:
-        yield tuple(np.concatenate(p) for p in zip(*waiting, strict=True))
+        indices, directions = (np.concatenate(p) for p in zip(*waiting, strict=True))
+        yield indices, directions

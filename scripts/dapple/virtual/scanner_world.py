@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 
@@ -36,7 +37,7 @@ class World:
     """
 
     mi: ModuleType
-    scene: object
+    scene: Any
     shift_m: np.ndarray
     normal: np.ndarray
     brightness: np.ndarray

@@ -94,8 +94,8 @@ def grow(
     InputError
         An unknown species, no tree, or a tree outside the box.
     """
-    settings = of_stand(species, positions_m, size_m, leaf_area_index, **changes)
     positions_m = np.asarray(positions_m, np.float64).reshape(-1, 2)
+    settings = of_stand(species, positions_m.tolist(), size_m, leaf_area_index, **changes)
     n, size = len(positions_m), np.asarray(size_m, np.float64)
     leaf_area_m2 = leaf_area_index * size[0] * size[1] / n
     plants = tuple(
@@ -129,7 +129,7 @@ def area_in_voxels(stand: Stand, part: str, voxel_size_m: float) -> np.ndarray:
     (nx, ny, nz) float64
         [m²]; what grows out of the box is left out.
     """
-    shape = grid_shape(stand.size_m, voxel_size_m)
+    shape = grid_shape(stand.size_m.tolist(), voxel_size_m)
     area = np.zeros(shape)
     for corners in stand.triangles(part):
         _add_area(np.ascontiguousarray(corners), voxel_size_m, area)

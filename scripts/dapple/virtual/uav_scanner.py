@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -81,7 +82,7 @@ class Flight:
 
     def scanner(self) -> Scanner:
         """The beam and detector, as the terrestrial scanner's model describes them."""
-        surfaces = {
+        surfaces: dict[str, Any] = {
             f"{kind}_reflectance_db": (
                 10 * np.log10(getattr(self, f"{kind}_reflectance")),
                 self.reflectance_sd_db,
@@ -160,14 +161,14 @@ def scan(
         `ReturnNumber`, `NumberOfReturns`, `ScanAngle` [°], `GpsTime` [s], `PointSourceId`
         (flight line) and `Truth` (class code).
     """
-    low_m, high_m = np.asarray(low_m, float), np.asarray(high_m, float)
+    low, high = np.asarray(low_m, float), np.asarray(high_m, float)
     scanner = flight.scanner()
-    centre = np.append(0.5 * (low_m + high_m), ground_z_m)
+    centre = np.append(0.5 * (low + high), ground_z_m)
     world = build(meshes, None, centre, scanner, seed)
-    for number, pulses in enumerate(_chunks(flight, low_m, high_m, ground_z_m, seed)):
+    for number, pulses in enumerate(_chunks(flight, low, high, ground_z_m, seed)):
         rng = np.random.default_rng(stream_seed(seed, "pulses", number))
         cloud = _fire(world, flight, scanner, pulses, rng)
-        inside = ((cloud.xyz_m[:, :2] >= low_m) & (cloud.xyz_m[:, :2] < high_m)).all(axis=1)
+        inside = np.all((cloud.xyz_m[:, :2] >= low) & (cloud.xyz_m[:, :2] < high), axis=1)
         cloud = cloud.select(inside)
         yield Cloud(cloud.xyz_m, np.asarray(origin_m, float), cloud.attributes)
 
