@@ -10,6 +10,17 @@ Makes   figures/tree.png          the tree from the side and from above, with th
         report.html               one self-contained page
 """
 
+# Figures of the page, in its order: the name of the caption, and where a plain run makes it.
+FIGURES = {
+    "figures/tree.png": ("tree", LIT),
+    "figures/series.png": ("series", LIT),
+    "figures/boxplot.png": ("boxplot", COMPARED),
+    "figures/scatter.png": ("scatter", COMPARED),
+    "figures/ground_map.png": ("ground_map", LIT),
+    "figures/advice.png": ("advice", False),
+    "tradeoff/chart.png": ("tradeoff", False),
+}
+
 
 rule tree_figure:
     input:
@@ -129,6 +140,7 @@ rule ground_map_figure:
 rule page:
     input:
         made=[path for path in targets() if not path.endswith("report.html")],
+        captions=[caption(name) for name, _ in FIGURES.values()],
         code=code("page"),
     output:
         page=results("report.html"),
@@ -143,6 +155,7 @@ rule page:
         mem_mb=500,
     params:
         experiment=settings.experiment,
+        figures=list(FIGURES),
     message:
         said("report.html")
     script:

@@ -15,16 +15,12 @@ def light_targets():
         wanted += ["structure/polygons/distance.json"]
     if LIT:
         wanted += [f"light/{name}.nc" for name in LIT]
-        wanted += ["figures/tree.png", "figures/ground_map.png", "figures/series.png"]
     if CHECKED:
         wanted += ["statistics/agreement.csv"]
     if COMPARED:
         wanted += ["statistics/overall.csv", "statistics/per_sensor.csv"]
-        wanted += [
-            "statistics/mixed_model.csv",
-            "figures/boxplot.png",
-            "figures/scatter.png",
-        ]
+        wanted += ["statistics/mixed_model.csv"]
+    wanted += [figure for figure, (_, is_made) in FIGURES.items() if is_made]
     return [*wanted, "verdict.json", "runtime.csv", "report.html"]
 
 

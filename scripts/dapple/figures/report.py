@@ -3,6 +3,7 @@
 import base64
 import html
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
 import pandas as pd
@@ -12,15 +13,6 @@ TABLES = {
     "statistics/mixed_model.csv": "Measured on simulated light, sensor as random effect",
     "statistics/agreement.csv": "Transport engine against per-timestep reference",
     "runtime.csv": "Time and memory of every step",
-}
-FIGURES = {
-    "figures/tree.png": "The tree from the side and from above, with the sensors.",
-    "figures/series.png": "PAR through the day at chosen sensors.",
-    "figures/boxplot.png": "Correlation of every sensor by reconstruction.",
-    "figures/scatter.png": "Simulated against measured PAR.",
-    "figures/ground_map.png": "PAR on the ground.",
-    "figures/advice.png": "What each refinement of the light changes.",
-    "tradeoff/chart.png": "Accuracy against speed.",
 }
 NOTICED = ("sky/radiation.json", "sky/optics.json", "sky/sensors.json", "statistics/records.json")
 LEVELS = ("error", "warning", "note")
@@ -41,7 +33,7 @@ figure { margin: 1.5rem 0; } img { max-width: 100%; } figcaption { color: #555; 
 """
 
 
-def build(experiment: str, folder: Path) -> str:
+def build(experiment: str, folder: Path, captions: Mapping[str, str]) -> str:
     """Gather what a run has made into one HTML page without links to other files.
 
     Parameters
@@ -50,6 +42,9 @@ def build(experiment: str, folder: Path) -> str:
         Title.
     folder : path
         `results/{experiment}`.
+    captions : mapping of str to str
+        What stands below each figure, by its file in the folder; those that are missing there are
+        left out.
 
     Returns
     -------
@@ -61,12 +56,13 @@ def build(experiment: str, folder: Path) -> str:
     for name, title in TABLES.items():
         if (path := folder / name).is_file():
             parts += [f"<h2>{title}</h2>", _table(pd.read_csv(path))]
-    for name, caption in FIGURES.items():
+    for name, caption in captions.items():
         if (path := folder / name).is_file():
+            text = html.escape(caption)
             data = base64.b64encode(path.read_bytes()).decode()
             parts.append(
-                f'<figure><img alt="{caption}" src="data:image/png;base64,{data}">'
-                f"<figcaption>{caption}</figcaption></figure>"
+                f'<figure><img alt="{text}" src="data:image/png;base64,{data}">'
+                f"<figcaption>{text}</figcaption></figure>"
             )
     body = "\n".join(parts)
     title = html.escape(f"dapple: {experiment}")
