@@ -266,6 +266,19 @@ def test_every_voxel_stands_where_its_coordinates_say():
     assert found["direct"][:, 0] / open_sky == pytest.approx(seen[:, 0], abs=0.016)
 
 
+def test_an_entrance_across_the_border_of_the_medium_is_shaded_as_a_whole():
+    """A wall of leaves in the east, and parts of the entrances in the empty voxels before it."""
+    wall = voxels(np.full((1, 40, 40), 3.0), 0.5, (0.0, -10.0, 0.0))
+    scene = mitsuba_scene.build(Scene(voxels=wall), optics())
+    sensors = np.array([[x, 0.0, 1.0] for x in (-0.8, -0.6, -0.5, -0.4)])
+    found = light(
+        scene, sensors, zenith=60.0, azimuth=90.0, aperture_m=0.8,
+        effort=effort(direct=1024), diffuse=0.0 * DIFFUSE,
+    )  # fmt: skip
+    expected = 0.5 * BEAM * np.exp(-0.5 * 3.0 * 0.5 / np.sin(np.radians(60.0)))
+    assert found["direct"] == pytest.approx(np.tile(expected, (4, 1)), rel=0.03)
+
+
 def test_light_scattered_once_in_a_turbid_layer_follows_the_phase_function():
     rho, tau, depth = np.array([0.6, 0.0, 0.2]), np.array([0.0, 0.6, 0.4]), 0.5 * 0.8
     scene = mitsuba_scene.build(Scene(voxels=slab(0.8)), optics(rho=rho, tau=tau))

@@ -205,21 +205,20 @@ def _radiance(
     """Radiance (n, replicates, rays, 3) that arrives along rays, from a Mitsuba integrator."""
     mi = scene.mi
     tracer, sampler = mi.load_dict(integrator), mi.load_dict({"type": "independent"})
-    inside = scene.in_medium(start[:, 0, 0])
+    # Ray by ray: a wide entrance may lie across the border of the medium.
+    inside = scene.in_medium(start)
     radiance = np.zeros(way.shape)
     for medium, chosen in ((None, ~inside), (scene.medium, inside)):
         if not chosen.any():
             continue
-        shape = way[chosen].shape
         origins, ways = (
-            np.ascontiguousarray(values[chosen].reshape(-1, 3).T, dtype=np.float32)
-            for values in (start, way)
+            np.ascontiguousarray(values[chosen].T, dtype=np.float32) for values in (start, way)
         )
         ray = mi.RayDifferential3f(mi.Point3f(origins), mi.Vector3f(ways))
         sampler.seed(seed, origins.shape[1])
-        mask = mi.Bool(active[chosen].ravel())
+        mask = mi.Bool(active[chosen])
         colour, _, _ = tracer.sample(scene.scene, sampler, ray, medium, mask)
-        radiance[chosen] = np.array(colour & mask).T.reshape(shape)
+        radiance[chosen] = np.array(colour & mask).T
     return radiance
 
 

@@ -62,11 +62,11 @@ class RenderScene:
         return "path" if self.medium is None else "volpath"
 
     def in_medium(self, points_m: np.ndarray) -> np.ndarray:
-        """(n,) whether points lie in the box that the turbid medium fills."""
+        """Whether points (..., 3) lie in the box that the turbid medium fills."""
         if self.medium_box_m is None:
-            return np.zeros(len(points_m), dtype=bool)
+            return np.zeros(points_m.shape[:-1], dtype=bool)
         low, high = self.medium_box_m
-        return ((points_m > low) & (points_m < high)).all(axis=1)
+        return ((points_m > low) & (points_m < high)).all(axis=-1)
 
     def set_optics(self, optics: Optics) -> None:
         """Give the surfaces of meshes and the ground other colours, in as many bands as before."""
