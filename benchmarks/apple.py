@@ -22,6 +22,7 @@ from published_apple import Run
 from scipy.ndimage import gaussian_filter1d
 
 from dapple.light.rays_to_sky import Tracer
+from dapple.optics.responses import COSINE
 from dapple.registration import shading
 from dapple.scene import traced
 from dapple.scene.surfaces import Scene, of_kinds
@@ -208,7 +209,8 @@ def whole_model(run: Run) -> pd.DataFrame:
             split_by="time",
             fit_share=0.999,
             gain="site",
-            entrance_m=settings.light.entrance_m,
+            aperture_m=settings.light.entrance_m,
+            response=COSINE,
             variant="llvm_ad_mono",
             seed=3,
         )

@@ -78,6 +78,7 @@ if LIT:
                 "sun_kernel_deg",
                 "sun_diameter_deg",
                 "aperture_m",
+                "response",
             ),
             seed=stream("advice"),
         message:
@@ -129,7 +130,9 @@ if LIT:
         params:
             **settings.tradeoff.model_dump(exclude={"max_orders"}),
             **PILOT,
-            tracing=tracing("sun_kernel_deg", "sun_diameter_deg", "aperture_m"),
+            tracing=tracing(
+                "sun_kernel_deg", "sun_diameter_deg", "aperture_m", "response"
+            ),
             orders=settings.tradeoff.max_orders,
             polygon_size_m=settings.polygons.voxel_size_m,
             timestep=REFERENCE,

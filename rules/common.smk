@@ -17,6 +17,7 @@ from dapple.clock import time_range
 from dapple.cloud.classifiers import CLASSIFIERS
 from dapple.config.settings import validate
 from dapple.errors import InputError
+from dapple.optics import responses
 from dapple.streams import stream_seed
 from dapple.structure.voxel_sizes import finer_than
 from dapple.workflow import code_of, short
@@ -59,9 +60,6 @@ OF_BEAM = {
     "sun_diameter_deg": settings.light.sun_diameter_deg,
     "aperture_m": settings.light.entrance_m,
 }
-REFERENCE = OF_BEAM | {"variant": f"{VARIANT}_rgb"}
-REFERENCE |= settings.light.timestep.model_dump(exclude={"step_min", "times_per_job"})
-TRACING = settings.light.transport.model_dump() | OF_BEAM
 CHECKED = LIT if settings.light.engine == "transport" and settings.light.check else ()
 ADVISED = settings.light.model == "advised"
 COMPARED = LIT if settings.measured.kind != "none" else ()
@@ -163,6 +161,14 @@ def optics():
 
 
 OPTICS = optics()
+RESPONSE = (
+    responses.read(data(settings.sensors.response_table))
+    if settings.sensors.response == "table"
+    else responses.NAMED[settings.sensors.response]
+)
+TRACING = settings.light.transport.model_dump() | OF_BEAM | {"response": RESPONSE}
+REFERENCE = OF_BEAM | {"variant": f"{VARIANT}_rgb", "response": RESPONSE}
+REFERENCE |= settings.light.timestep.model_dump(exclude={"step_min", "times_per_job"})
 
 
 def tracing(*names):

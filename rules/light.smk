@@ -106,6 +106,7 @@ if settings.light.engine == "transport":
                 "max_growth",
                 "sun_kernel_deg",
                 "aperture_m",
+                "response",
             ),
             ground_z_m=GROUND_Z_M,
             sensor_table=SENSOR_TABLE,
@@ -146,6 +147,7 @@ if settings.light.engine == "transport":
                 "sun_kernel_deg",
                 "sun_diameter_deg",
                 "aperture_m",
+                "response",
             ),
             ground_z_m=GROUND_Z_M,
             n_times=N_TIMES,
@@ -182,7 +184,8 @@ rule ground_map:
         timezone=settings.time.timezone,
         spacing_m=settings.figures.map_spacing_m,
         margin_m=settings.figures.map_margin_m,
-        engine=REFERENCE,
+        # Flux through the level, whatever the sensors are.
+        engine=REFERENCE | {"response": responses.COSINE},
         ground_z_m=GROUND_Z_M,
         seed=stream("ground_map"),
     message:

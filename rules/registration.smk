@@ -39,6 +39,7 @@ if settings.registration.fit:
             records=settings.measured.table(),
             sun_diameter_deg=settings.light.sun_diameter_deg,
             aperture_m=settings.light.entrance_m,
+            response=RESPONSE,
             variant=f"{VARIANT}_rgb",
             seed=stream("registration"),
         message:

@@ -41,6 +41,7 @@ rule records:
         kind=settings.measured.kind,
         table=settings.measured.table(),
         sensor_model=settings.measured.sensor_model(),
+        response=RESPONSE,
         reconstructions=COMPARED,
         seed=stream("records"),
     message:
@@ -98,6 +99,7 @@ rule agreement:
         mem_mb=500,
     params:
         reconstructions=CHECKED,
+        response=RESPONSE,
     message:
         said("transport engine against the per-timestep engine")
     script:

@@ -52,6 +52,7 @@ rule verdict:
         variant=f"{VARIANT}_mono",
         sun_diameter_deg=settings.light.sun_diameter_deg,
         aperture_m=settings.light.entrance_m,
+        response=RESPONSE,
         seed=stream("verdict"),
     message:
         said("how far the run can be trusted")

@@ -7,11 +7,11 @@ from dapple.workflow import run
 
 
 def main(snakemake):
-    inputs = snakemake.input
-    sky = open_sky_par(netcdf.read(inputs.sky))
+    params, inputs = snakemake.params, snakemake.input
+    sky = open_sky_par(netcdf.read(inputs.sky), params.response)
     rows = {}
     for name, fast, slow in zip(
-        snakemake.params.reconstructions, inputs.light, inputs.reference, strict=True
+        params.reconstructions, inputs.light, inputs.reference, strict=True
     ):
         reference = netcdf.read(slow)
         times = reference["time"]

@@ -22,7 +22,7 @@ def main(snakemake):
     else:
         places = tables.read(inputs.sensors)
         records = measured.read(inputs.measured, sensors=places, **params.table)
-    sky = open_sky_par(netcdf.read(inputs.sky))
+    sky = open_sky_par(netcdf.read(inputs.sky), params.response)
     table = pd.concat(
         [
             pair(

@@ -37,6 +37,7 @@ def main(snakemake):
         fit_share=params.fit_share,
         sun_diameter_deg=params.sun_diameter_deg,
         aperture_m=params.aperture_m,
+        response=params.response,
         gain=params.gain,
         variant=params.variant,
         seed=params.seed,

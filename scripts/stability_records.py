@@ -36,6 +36,7 @@ def main(snakemake):
         options = {
             "sun_diameter_deg": params.sun_diameter_deg,
             "aperture_m": params.aperture_m,
+            "response": params.response,
             "max_rays": MAX_RAYS,
             "tolerance": TOLERANCE,
             "shift_m": error_m,

@@ -59,6 +59,7 @@ def lighted(found, inputs, params):
         measured_umol_m2_s=pairs.measured(tables.read(inputs.records)) if inputs.records else None,
         sun_diameter_deg=params.sun_diameter_deg,
         aperture_m=params.aperture_m,
+        response=params.response,
         seed=params.seed,
     )
 

@@ -57,6 +57,7 @@ def stability_setup():
                 "sun_kernel_deg",
                 "sun_diameter_deg",
                 "aperture_m",
+                "response",
             ),
             "truth_factor": STABILITY.truth_factor,
         },

@@ -42,6 +42,7 @@ if WORSENED:
             variant=f"{VARIANT}_mono",
             sun_diameter_deg=settings.light.sun_diameter_deg,
             aperture_m=settings.light.entrance_m,
+            response=RESPONSE,
             seed=stream("stability_records"),
         message:
             said("its own records made worse")

@@ -206,6 +206,7 @@ def paths(
         max_orders=model.max_orders,
         growth=growth,
         aperture_m=tracing.aperture_m,
+        response=tracing.response,
         seed=seed,
     )
 

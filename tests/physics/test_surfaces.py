@@ -6,8 +6,8 @@ from tests.physics.slab import turbid_slab
 
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
-from dapple.light import tensor, transport
-from dapple.light.timestep import Effort, timestep
+from dapple.light import brf, tensor, transport
+from dapple.light.timestep import Rays, timestep
 from dapple.scene import mitsuba_scene, traced
 from dapple.scene.counters import Counters
 from dapple.scene.scene_optics import Optics
@@ -90,7 +90,7 @@ def by_timestep(scene, leaf):
         diffuse_horizontal=np.array([np.pi]),
         sky=lambda zenith, azimuth: np.ones_like(zenith),
         sun_diameter_deg=SUN_DIAMETER_DEG,
-        effort=Effort(16, 1, 1024, 1024, max_depth=200, roulette_depth=20),
+        rays=Rays(16, 1, 1024, 1024, max_depth=200, roulette_depth=20),
         seed=1,
     )
     return found["total"][:, 0], found["standard_error"][:, 0]
@@ -118,6 +118,51 @@ def test_both_engines_see_the_same_species():
     assert one == pytest.approx(other, abs=4 * np.hypot(error, its_error).max())
     swapped = optics((0.1, 0.6), (0.3, 0.1), 0.5, 0.9, 0.2)
     assert np.abs(by_transport(two_species(), swapped)[0] - one).max() > 5 * error.max()
+
+
+def faces(surface):
+    """Windows on both faces of the squares of a surface, in all of its places."""
+    square = surface.mesh.vertices_m.reshape(-1, 4, 3)
+    places = np.zeros((1, 3)) if surface.places_m is None else surface.places_m
+    along, across = square[:, 1] - square[:, 0], square[:, 3] - square[:, 0]
+    normal = np.cross(along, across)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    sides = [
+        (square[:, 0] + place + 1e-4 * side * normal, along, across, side * normal)
+        for place in places
+        for side in (1, -1)
+    ]
+    return brf.Views(*(np.concatenate(part) for part in zip(*sides, strict=True)), cosine=True)
+
+
+def test_what_two_species_ground_and_sky_get_is_what_the_sky_gives():
+    """Of light on both faces of every leaf and of wood, and on ground, a share is absorbed."""
+    scene = two_species()
+    loaded = traced.load(scene, cell_m=np.array([[-2.0, -2.0], [2.0, 2.0]]))
+
+    def share(views, n_paths):
+        """Of the light that the sky sends into the cell, what gets through windows."""
+        area = np.linalg.norm(np.cross(views.edge_a_m, views.edge_b_m), axis=1) / 16.0
+        settings = {"n_paths": n_paths, "max_orders": 100, "seed": 1}
+        received = brf.collect(loaded, views, np.array([0.0, 0.0, 1.0]), **settings)
+        flux, error = brf.reflectance_factor(received, GREEN, diffuse_share=1.0)
+        return np.array([area @ flux[:, 0], np.linalg.norm(area * error[:, 0])])
+
+    def through_the_cell(height_m, up):
+        axis = np.array([[0.0, 0.0, up]])
+        return share(brf.over_cell(loaded, axis, height_m=height_m, cosine=True), 60_000)
+
+    budget = {"sky": through_the_cell(5.0, -1.0)}
+    budget["ground"] = (1 - GREEN.reflectance_of("ground")) * through_the_cell(1e-4, 1.0)
+    for surface in scene.filled:
+        name = surface.optics
+        sent_on = GREEN.albedo(name) if surface.is_leaf else GREEN.reflectance_of(name)
+        budget[name] = (1 - sent_on) * share(faces(surface), 128)
+    found, error = np.array(list(budget.values())).T
+    assert list(budget) == ["sky", "ground", "apple", "wood", "grass", "stone"]
+    assert (found > 4 * error).all()
+    assert found.sum() == pytest.approx(1.0, abs=3 * np.linalg.norm(error))
+    assert np.linalg.norm(error) < 0.003
 
 
 def test_under_two_endless_leaves_each_lets_its_own_light_through():

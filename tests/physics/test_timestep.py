@@ -8,7 +8,7 @@ from scipy.special import expn
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
 from dapple.light.rays_to_sky import Tracer
-from dapple.light.timestep import Effort, timestep
+from dapple.light.timestep import Rays, timestep
 from dapple.scene import mitsuba_scene, render_scene
 from dapple.scene.phase import phase_function
 from dapple.scene.scene_optics import Optics, group_bands, group_flux
@@ -21,9 +21,9 @@ BEAM, DIFFUSE = np.array([500.0, 600.0, 700.0]), np.array([90.0, 80.0, 70.0])
 ORIGIN = np.zeros((1, 3))
 
 
-def effort(**more):
+def rays(**more):
     settings = {"replicates": 16, "direct": 128, "sky": 128, "scattered": 64, "max_depth": 8}
-    return Effort(**settings | more)
+    return Rays(**settings | more)
 
 
 def optics(rho=0.0, tau=0.0, bark=0.0, ground=0.0, n=3):
@@ -42,7 +42,7 @@ def clear(zenith_deg, azimuth_deg):
 
 
 def light(scene, sensors=ORIGIN, *, zenith=30.0, azimuth=0.0, beam=BEAM, diffuse=DIFFUSE, **more):
-    options = {"sky": even, "effort": effort(), "seed": 1}
+    options = {"sky": even, "rays": rays(), "seed": 1}
     options |= {"sun_diameter_deg": SUN_DIAMETER_DEG, **more}
     return timestep(
         scene,
@@ -121,7 +121,7 @@ def test_the_open_sky_gives_beam_and_diffuse_light():
 
 def test_an_uneven_sky_gives_the_same_diffuse_light_on_the_level():
     scene = mitsuba_scene.build(Scene(), optics())
-    found = light(scene, zenith=50.0, azimuth=110.0, sky=clear, effort=effort(sky=4096))
+    found = light(scene, zenith=50.0, azimuth=110.0, sky=clear, rays=rays(sky=4096))
     assert found["sky"][0] == pytest.approx(DIFFUSE, rel=2e-3)
 
 
@@ -146,13 +146,13 @@ def test_a_wall_shades_from_the_side_on_which_it_stands(azimuth):
         z, a = np.radians(z), np.radians(a)
         return 1.0 + np.sin(z) * (0.6 * np.sin(a) + 0.3 * np.cos(a))
 
-    behind = light(scene, azimuth=azimuth, sky=sky, effort=effort(sky=1024))
+    behind = light(scene, azimuth=azimuth, sky=sky, rays=rays(sky=1024))
     assert (behind["direct"] == 0.0).all()
     visible = 0.5 - (2.0 / 3.0) / np.pi * (0.6 * out[0] + 0.3 * out[1])
     assert behind["sky"][0] == pytest.approx(visible * DIFFUSE, rel=5e-3)
 
-    bright = effort(scattered=1024)
-    before = light(scene, azimuth=azimuth + 180.0, diffuse=0.0 * DIFFUSE, effort=bright)
+    bright = rays(scattered=1024)
+    before = light(scene, azimuth=azimuth + 180.0, diffuse=0.0 * DIFFUSE, rays=bright)
     assert before["direct"][0] == pytest.approx(BEAM * np.cos(np.radians(30.0)), rel=1e-3)
     # half of what the sensor sees is a wall that reflects half of the beam
     assert before["scattered"][0] == pytest.approx(0.25 * BEAM * np.sin(np.radians(30.0)), rel=0.03)
@@ -161,7 +161,7 @@ def test_a_wall_shades_from_the_side_on_which_it_stands(azimuth):
 @pytest.mark.parametrize("radius", [0.5, 2.0])
 def test_a_black_disc_overhead_hides_its_share_of_the_sky(radius):
     scene = mitsuba_scene.build(Scene(of_kinds(leaf=disc(radius, 1.0))), optics())
-    found = light(scene, zenith=0.0, effort=effort(sky=2048))
+    found = light(scene, zenith=0.0, rays=rays(sky=2048))
     assert found["sky"][0] == pytest.approx(DIFFUSE / (1.0 + radius**2), rel=5e-3)
     assert (found["direct"] == 0.0).all()
 
@@ -180,7 +180,7 @@ def test_the_sun_is_a_disc_with_a_penumbra():
     )
     edge = np.array([-1.1, -0.7, -0.2, 0.0, 0.4, 0.9, 1.1])
     sensors = np.column_stack([edge * radius, np.zeros((7, 2))])
-    found = light(scene, sensors, zenith=0.0, effort=effort(direct=512))
+    found = light(scene, sensors, zenith=0.0, rays=rays(direct=512))
     s = np.clip(edge, -1.0, 1.0)
     expected = (np.arccos(s) - s * np.sqrt(1.0 - s * s)) / np.pi
     assert found["direct"][:, 0] / BEAM[0] == pytest.approx(expected, abs=0.006)
@@ -191,7 +191,7 @@ def test_a_sheet_that_transmits_turns_beam_and_sky_into_scattered_light():
     scene = mitsuba_scene.build(
         Scene(of_kinds(leaf=level((-400.0, 400.0), (-400.0, 400.0), 1.0))), optics(tau=tau)
     )
-    found = light(scene, zenith=60.0, effort=effort(scattered=512))
+    found = light(scene, zenith=60.0, rays=rays(scattered=512))
     assert (found["direct"] == 0.0).all()
     assert found["sky"][0] == pytest.approx(0.0, abs=0.01)
     assert found["scattered"][0] == pytest.approx(tau * (BEAM * 0.5 + DIFFUSE), rel=0.01)
@@ -203,7 +203,7 @@ def test_light_between_a_sheet_and_the_ground_sums_a_geometric_series():
         Scene(of_kinds(leaf=level((-400.0, 400.0), (-400.0, 400.0), 0.5))),
         optics(rho=rho, tau=tau, ground=ground),
     )
-    found = light(scene, effort=effort(scattered=1024, max_depth=40))
+    found = light(scene, rays=rays(scattered=1024, max_depth=40))
     above = BEAM * np.cos(np.radians(30.0)) + DIFFUSE
     assert found["total"][0] == pytest.approx(tau * above / (1.0 - rho * ground), rel=0.01)
 
@@ -219,8 +219,8 @@ def test_in_a_furnace_every_sensor_sees_the_same_light(form):
         density = np.random.default_rng(3).random((4, 3, 2)) * 4.0
         scene = Scene(of_kinds(wood=trunk), voxels(density, 0.5, (-1.0, -0.7, 0.5)))
     sensors = np.array([[0.0, 0.0, 0.0], [0.5, 0.1, 1.0], [0.2, 0.2, 5.0], [-1.0, 2.0, 0.2]])
-    much = effort(sky=256, scattered=256, max_depth=400, roulette_depth=400)
-    found = light(mitsuba_scene.build(scene, conserving), sensors, beam=0.0 * BEAM, effort=much)
+    much = rays(sky=256, scattered=256, max_depth=400, roulette_depth=400)
+    found = light(mitsuba_scene.build(scene, conserving), sensors, beam=0.0 * BEAM, rays=much)
     error = 4.5 * found["standard_error"] + 1e-3 * DIFFUSE
     assert (np.abs(found["total"] - DIFFUSE) < error).all()
     assert (found["standard_error"] < 0.02 * DIFFUSE).all()
@@ -229,9 +229,9 @@ def test_in_a_furnace_every_sensor_sees_the_same_light(form):
 @pytest.mark.parametrize("leaf_area_index", [0.5, 3.0])
 def test_a_black_turbid_layer_transmits_exponentially(leaf_area_index):
     scene = mitsuba_scene.build(Scene(voxels=slab(leaf_area_index)), optics())
-    much = effort(direct=1024, sky=1024)
+    much = rays(direct=1024, sky=1024)
     for zenith in (0.0, 60.0):
-        found = light(scene, zenith=zenith, azimuth=77.0, effort=much)
+        found = light(scene, zenith=zenith, azimuth=77.0, rays=much)
         cosine = np.cos(np.radians(zenith))
         expected = BEAM * cosine * np.exp(-0.5 * leaf_area_index / cosine)
         error = 4.0 * np.sqrt(expected * BEAM * cosine / (1024 * 16))
@@ -254,7 +254,7 @@ def test_every_voxel_stands_where_its_coordinates_say():
         zenith=35.0,
         azimuth=50.0,
         diffuse=0.0 * DIFFUSE,
-        effort=effort(direct=1024),
+        rays=rays(direct=1024),
     )
     way = np.array([[np.sin(0.610865) * np.sin(0.872665), np.sin(0.610865) * np.cos(0.872665)]])
     way = np.column_stack([way, [np.cos(0.610865)]])
@@ -286,7 +286,7 @@ def test_light_scattered_once_in_a_turbid_layer_follows_the_phase_function():
         scene,
         zenith=0.0,
         diffuse=0.0 * DIFFUSE,
-        effort=effort(scattered=2048, max_depth=2),
+        rays=rays(scattered=2048, max_depth=2),
     )
     mu = (np.arange(2000) + 0.5) / 2000
     # extinction on the way in, scattering, extinction on the slanted way out, integrated in depth
@@ -304,7 +304,7 @@ def test_many_small_leaves_do_what_a_turbid_medium_does():
     turbid = voxels(np.full((6, 6, 2), 2.0), 1.0, low)
     sensors = np.array([[x, y, 0.5] for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)])
     found = [
-        light(mitsuba_scene.build(scene, leaf), sensors, effort=effort(scattered=256))
+        light(mitsuba_scene.build(scene, leaf), sensors, rays=rays(scattered=256))
         for scene in (Scene(of_kinds(leaf=cloud)), Scene(voxels=turbid))
     ]
     polygons, medium = ({part: f[part].mean() for part in ("sky", "scattered")} for f in found)
@@ -317,8 +317,8 @@ def test_standard_errors_are_what_repetition_shows():
         Scene(of_kinds(leaf=leaves(2000, 0.1, (-1, -1, 1), (1, 1, 2), 9))), optics(rho=0.2, tau=0.2)
     )
     sensors = np.random.default_rng(1).uniform(-1.0, 1.0, (40, 3)) * [1.0, 1.0, 0.0]
-    much = effort(replicates=16, direct=8, sky=8, scattered=8)
-    runs = [light(scene, sensors, effort=much, seed=seed) for seed in range(20)]
+    much = rays(replicates=16, direct=8, sky=8, scattered=8)
+    runs = [light(scene, sensors, rays=much, seed=seed) for seed in range(20)]
     spread = np.var([run["par"] for run in runs], axis=0, ddof=1)
     told = np.mean([run["par_standard_error"] ** 2 for run in runs], axis=0)
     # each ratio scatters by a third, and there are 40 of them
@@ -364,11 +364,11 @@ def test_few_groups_of_bands_do_for_all_bands():
     diffuse = 6.0 * (500.0 / nm) ** 2
     scene = Scene(of_kinds(leaf=leaves(3000, 0.12, (-1, -1, 0.5), (1, 1, 2.5), 9)))
     sensors = np.random.default_rng(1).uniform(-1.0, 1.0, (30, 3)) * [1.0, 1.0, 0.0]
-    much = effort(replicates=4, direct=64, sky=64, scattered=256)
+    much = rays(replicates=4, direct=64, sky=64, scattered=256)
 
     def par(optics, beam, diffuse):
         built = mitsuba_scene.build(scene, optics)
-        return light(built, sensors, beam=beam, diffuse=diffuse, effort=much)["par"]
+        return light(built, sensors, beam=beam, diffuse=diffuse, rays=much)["par"]
 
     def bands(chosen):
         return full.each(lambda values: values[chosen])
@@ -409,7 +409,7 @@ def test_groups_of_bands_keep_flux_and_means():
             "no reflectance of `fruit`",
             lambda: mitsuba_scene.build(Scene([Surface(disc(1.0, 1.0), "fruit")]), optics()),
         ),
-        ("replicates", lambda: effort(replicates=1)),
+        ("replicates", lambda: rays(replicates=1)),
         (
             "erectophile",
             lambda: mitsuba_scene.build(

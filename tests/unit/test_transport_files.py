@@ -1,5 +1,7 @@
 """What was traced survives being written."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -8,6 +10,7 @@ from dapple.errors import InputError
 from dapple.formats import netcdf
 from dapple.light import transport_files as files
 from dapple.light.tensor import Transport
+from dapple.optics.responses import COSINE
 from dapple.scene.counters import Counters
 
 
@@ -35,6 +38,12 @@ def test_counted_paths_come_back_as_they_were(tmp_path, rows):
     for name, value in vars(before).items():
         np.testing.assert_array_equal(getattr(after, name), value)
         assert np.asarray(getattr(after, name)).dtype == np.asarray(value).dtype
+
+
+@pytest.mark.parametrize("response", [COSINE, ((0.0, 1.0), (60.0, 0.4), (90.0, 0.1))])
+def test_a_file_says_how_its_sensors_respond(tmp_path, response):
+    files.write(tmp_path / "paths.nc", replace(traced(), response=response))
+    assert files.read(tmp_path / "paths.nc").response == response
 
 
 def test_the_same_paths_give_the_same_bytes(tmp_path):

@@ -50,6 +50,8 @@ KEYS = {
     "site={timezone: UTC}": "series_figure",
     "time={end: 2023-08-10 16:30}": f"sky {SKY}",
     "sensors={height_m: 0.2}": f"sensors tree_figure {traced(4)}",
+    # The map of the ground shows level light, whatever sensors read.
+    "sensors={response: hemispherical}": traced(4),
     "measured={noise_relative: 0.03}": COMPARED,
     "registration={origin_m: [1, 0, 0]}": "",  # a grid stands in the tree's own frame
     "light={transport: {max_orders: 8}}": f"transport*4 light*4 agreement {COMPARED}",

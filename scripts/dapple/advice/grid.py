@@ -80,7 +80,7 @@ class Grid:
     @cached_property
     def open_sky(self) -> np.ndarray:
         """(t,) PAR without a tree [µmol m⁻² s⁻¹]."""
-        return open_sky_par(self.sky).to_numpy()
+        return open_sky_par(self.sky, self.tracing.response).to_numpy()
 
     @property
     def finest_model(self) -> Model:

@@ -124,7 +124,7 @@ class Pilot:
         self.sensors_m, self.sky, self.optics = sensors_m, sky, optics
         self.finest, self.tracing = finest, tracing
         self.repeats, self.seed = repeats, seed
-        self.open_sky = open_sky_par(sky).to_numpy()
+        self.open_sky = open_sky_par(sky, tracing.response).to_numpy()
 
     def light(self, scene: TracedScene, model: Model) -> tuple[Light, dict[str, Cost]]:
         """Light of a model and its cost with kernels that are compiled already."""

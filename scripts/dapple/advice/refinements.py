@@ -15,8 +15,9 @@ from dapple.advice.pilot import Effect, Pilot
 from dapple.formats.netcdf import time_coordinate, times
 from dapple.light.series import Light
 from dapple.light.visibility import Sunlit
+from dapple.optics.responses import Response
 from dapple.scene.traced import TracedScene
-from dapple.sky.open_sky import open_sky_par
+from dapple.sky.open_sky import level_diffuse, open_sky_par
 from dapple.sky.sun import position
 
 LEVELS = {
@@ -137,7 +138,7 @@ def step_effects(
         {name: ("time", values) for name, values in position(fine, *place).items()},
         coords={"time": time_coordinate(fine)},
     )
-    share_of_beam = _share_of_beam(series_sky, stamps, fine)
+    share_of_beam = _share_of_beam(series_sky, stamps, fine, pilot.tracing.response)
 
     def visible(known: np.ndarray) -> Sunlit:
         """The sun at some of the minutes, each of them traced."""
@@ -159,11 +160,11 @@ def step_effects(
 
 
 def _share_of_beam(
-    sky: xr.Dataset, stamps: pd.DatetimeIndex, wanted: pd.DatetimeIndex
+    sky: xr.Dataset, stamps: pd.DatetimeIndex, wanted: pd.DatetimeIndex, response: Response
 ) -> np.ndarray:
-    """Direct light on the level as a share of open-sky PAR."""
-    total = open_sky_par(sky).to_numpy()
-    diffuse = sky["diffuse_horizontal_umol_m2_s"].sum("band").to_numpy()
+    """Direct light as a share of what sensors read under the open sky."""
+    total = open_sky_par(sky, response).to_numpy()
+    diffuse = level_diffuse(sky, response)
     share = np.where(total > 0, 1 - diffuse / np.where(total > 0, total, 1), 0)
     return np.interp(wanted.as_unit("ns").asi8, stamps.as_unit("ns").asi8, share)
 

@@ -65,7 +65,9 @@ def paths(settings: Settings, where: str) -> None:
     for name in ("radiation", "sensors", "measured"):
         section = getattr(settings, name)
         needed[f"{name}.kind: table"] = (f"{name}.path", section.kind == "table", section.path)
-    radiation = settings.radiation
+    radiation, sensors = settings.radiation, settings.sensors
+    is_table = sensors.response == "table"
+    needed["sensors.response: table"] = ("sensors.response_table", is_table, sensors.response_table)
     is_measured = radiation.sky == "measured"
     needed["radiation.sky: measured"] = ("radiation.sky_table", is_measured, radiation.sky_table)
     for reason, (key, is_read, path) in needed.items():

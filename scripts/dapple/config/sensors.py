@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from dapple.config.base import FREY, Count, NotNegative, Positive, Section, key
+from dapple.optics import responses
+
+if TYPE_CHECKING:
+    SensorResponse = str
+else:
+    SensorResponse = Literal[(*responses.NAMED, "table")]
 
 
 class Sensors(Section):
@@ -23,6 +29,13 @@ class Sensors(Section):
     rows: Count = key(8, "grid: sensors from south to north")
     spacing_m: Positive = key(1.0, "grid: distance between neighbours", FREY)
     height_m: NotNegative = key(0.1, "grid: height above the ground")
+    response: SensorResponse = key(
+        "cosine",
+        "light by where it comes from: cosine, all of the upper hemisphere alike, or a table",
+    )
+    response_table: str = key(
+        "", "response: table: CSV of angle_deg from the normal, 0 to 90, and response"
+    )
 
     def table(self) -> dict[str, Any]:
         """Options of `scene.sensors.read`, without path and origin."""

@@ -8,6 +8,7 @@ import xarray as xr
 
 from dapple.light.tolerances import DIRECT_SHARE, PATH_SHARE
 from dapple.light.visibility import Sunlit
+from dapple.optics.responses import COSINE, Response
 from dapple.scene.scene_optics import Optics, group_bands, group_flux
 from dapple.scene.surfaces import GROUND
 from dapple.sky.sky_radiance import FLUXES, isotropic
@@ -64,6 +65,8 @@ class Tracing:
         stay as many as they are.
     sun_diameter_deg, aperture_m, sun_kernel_deg : float
         As in `visibility.sunlit` and `tensor.sun_radiance`.
+    response : Response
+        Of the sensors.
     """
 
     paths: int = 0
@@ -74,6 +77,7 @@ class Tracing:
     sun_diameter_deg: float = np.nan
     sun_kernel_deg: float = np.nan
     aperture_m: float = 0.0
+    response: Response = COSINE
 
     @property
     def sun_tolerance(self) -> float:

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from dapple.light import visibility
+from dapple.optics.responses import COSINE, Response
 from dapple.scene.traced import TracedScene
 from dapple.sky.open_sky import level_beam, towards_sun
 
@@ -36,6 +37,7 @@ def moved_light(
     max_rays: int = MAX_RAYS,
     tolerance: float = TOLERANCE,
     aperture_m: float = 0.0,
+    response: Response = COSINE,
 ) -> xr.Dataset:
     """Light at sensors that are moved sideways, each in its own direction.
 
@@ -59,6 +61,8 @@ def moved_light(
         How far they are moved [m].
     max_rays, tolerance, aperture_m
         As in `visibility.sunlit`.
+    response : Response
+        Of the sensors.
 
     Returns
     -------
@@ -80,7 +84,7 @@ def moved_light(
         for number, scene in enumerate(scenes)
     ]
     here, there = np.split(np.mean(shares, axis=0), 2)
-    change = xr.DataArray((there - here) * level_beam(sky), dims=("sensor", "time"))
+    change = xr.DataArray((there - here) * level_beam(sky, response), dims=("sensor", "time"))
     moved = light.copy()
     for name in ("par_umol_m2_s", "par_direct_umol_m2_s"):
         moved[name] = (light[name] + change.to_numpy()).clip(min=0)

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import drjit as dr
 import numpy as np
 
+from dapple.optics import sensor_response
+from dapple.optics.responses import COSINE, Response
 from dapple.scene.traced import TracedScene
 
 PLASTIC_STEPS = (3242174889, 2447445414)
@@ -54,8 +56,9 @@ def trace(
     first: np.ndarray | int = 0,
     halved_after: int | None = None,
     aperture_m: float = 0.0,
+    response: Response = COSINE,
 ) -> Paths:
-    """Trace paths backward from horizontal cosine sensors that look up.
+    """Trace paths backward from level sensors that look up.
 
     Parameters
     ----------
@@ -64,7 +67,8 @@ def trace(
     points_m : (n, 3) float64
         Sensors in the local frame [m].
     n_paths : (n,) int64
-        Paths from each point; their first directions follow a shifted R2 sequence.
+        Paths from each point; their first directions follow a shifted R2 sequence and are drawn as
+        often as light from there counts.
     max_orders : int
         A path that meets more surfaces is given up (and counted as cut); at most 255, less in
         scenes of many kinds of surfaces (`Counters.check`).
@@ -77,6 +81,8 @@ def trace(
         From this number of surfaces on every second path is ended and the other counts twice.
     aperture_m : float
         Diameter of the sensors' receiving discs [m].
+    response : Response
+        Of the sensors.
 
     Returns
     -------
@@ -100,7 +106,7 @@ def trace(
     for low in range(0, len(every), PATHS_PER_KERNEL):
         start = every[low : low + PATHS_PER_KERNEL]
         number = low + np.arange(len(start)) - (ends - n_paths - first)[start]
-        parts.append(_trace_block(scene, points, start, number, *fixed))
+        parts.append(_trace_block(scene, points, start, number, response, *fixed))
     start, direction, orders, weight, cut = (
         np.concatenate([part[k] for part in parts]) for k in range(5)
     )
@@ -109,7 +115,7 @@ def trace(
     return Paths(start[left], direction[left], orders[left], weight[left], lost)
 
 
-def _trace_block(scene, points, start, number, seed, max_orders, halved_after, radius):
+def _trace_block(scene, points, start, number, response, seed, max_orders, halved_after, radius):
     """Trace the paths of one kernel; those that were absorbed by chance are left out."""
     mi = scene.mi
     n = len(number)
@@ -117,7 +123,8 @@ def _trace_block(scene, points, start, number, seed, max_orders, halved_after, r
     point, shift = mi.sample_tea_32(start, seed)
     state, sequence = mi.sample_tea_32(point + number, shift)
     rng = mi.PCG32(initstate=mi.UInt64(state), initseq=mi.UInt64(sequence))
-    first = mi.warp.square_to_cosine_hemisphere(_stratified(mi, point, shift, number))
+    flat = mi.warp.square_to_uniform_disk_concentric(_stratified(mi, point, shift, number))
+    first = sensor_response.directions(response, *flat, dr.squared_norm(flat), dr)
     on_disc = mi.warp.square_to_uniform_disk(mi.Point2f(rng.next_float32(), rng.next_float32()))
     centre = mi.Point3f(*(dr.gather(mi.Float, axis, start) for axis in points))
     origin = centre + radius * mi.Vector3f(on_disc.x, on_disc.y, 0)
@@ -125,7 +132,7 @@ def _trace_block(scene, points, start, number, seed, max_orders, halved_after, r
         mi,
         scene,
         origin,
-        mi.Vector3f(first),
+        mi.Vector3f(*first),
         rng,
         dr.full(mi.Bool, True, n),
         max_orders,

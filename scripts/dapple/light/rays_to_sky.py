@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator
 import drjit as dr
 import numpy as np
 
+from dapple.optics import sensor_response
+from dapple.optics.responses import COSINE, Response
 from dapple.scene import patterns, traced
 from dapple.scene.surfaces import Scene
 from dapple.scene.traced import TracedScene
@@ -90,7 +92,14 @@ def sun_rays(
     return trace
 
 
-def sky_rays(scene: TracedScene, points_m: np.ndarray, sky: Patches, *, seed: int) -> SkyRays:
+def sky_rays(
+    scene: TracedScene,
+    points_m: np.ndarray,
+    sky: Patches,
+    *,
+    seed: int,
+    response: Response = COSINE,
+) -> SkyRays:
     """Prepare rays from points to the patches of the sky.
 
     Parameters
@@ -103,22 +112,23 @@ def sky_rays(scene: TracedScene, points_m: np.ndarray, sky: Patches, *, seed: in
         Subdivision of the sky into p patches.
     seed : int
         Shifts the pattern differently for each point, replicate and patch.
+    response : Response
+        Of the level sensors at the points.
 
     Returns
     -------
     callable
         Of points (m,), a number of replicates r, the first ray's number and the number of rays in
         a patch and replicate. It returns the sums (m, r, p) of what the rays see, 0 to 1 each;
-        rays are evenly spread over a patch's projected solid angle.
+        rays are spread over a patch as light counts at the sensor.
     """
     mi = scene.mi
     points = _columns(mi, points_m)
     width = 2 * np.pi / np.repeat(sky.row_count, sky.row_count)
     start = (np.arange(sky.n) - np.repeat(sky.row_start, sky.row_count) - 0.5) * width
-    low, high = (
-        np.repeat(bound**2, sky.row_count) for bound in (sky.row_sine[:-1], sky.row_sine[1:])
-    )
-    # Within a patch the squared sine of the altitude and the azimuth are even.
+    below = sensor_response.share_below(response, sky.row_sine)
+    low, high = (np.repeat(bound, sky.row_count) for bound in (below[:-1], below[1:]))
+    # Within a patch the share that comes from below and the azimuth are even.
     table = _columns(mi, np.stack([low, high - low, start, width], axis=1))
     n_patches, key = dr.opaque(mi.UInt32, sky.n), dr.opaque(mi.UInt32, seed)
 
@@ -129,10 +139,9 @@ def sky_rays(scene: TracedScene, points_m: np.ndarray, sky: Patches, *, seed: in
         low, height, start, width = (
             dr.gather(mi.Float, column, item % n_patches) for column in table
         )
-        squared = dr.fma(u[0], height, low)
+        level, up = sensor_response.height(response, dr.fma(u[0], height, low), dr)
         east, north = dr.sincos(dr.fma(u[1], width, start))
-        level = dr.safe_sqrt(1 - squared)
-        way = mi.Vector3f(level * east, level * north, dr.sqrt(squared))
+        way = mi.Vector3f(level * east, level * north, up)
         point = dr.gather(mi.UInt32, mi.UInt32(point.astype(np.uint32)), number)
         origin = mi.Point3f(*(dr.gather(mi.Float, a, point) for a in points))
         return np.array(dr.block_sum(scene.transmittance(origin, way, way.z > 0), n_rays))
@@ -207,23 +216,27 @@ class Tracer:
         seen = trace(np.arange(shape[0] * shape[1]), 1, 0, n_disc)[0] / n_disc
         return seen.reshape(shape).astype(np.float32)
 
-    def sky_visibility(self, points_m: np.ndarray, *, n: int, seed: int) -> np.ndarray:
-        """Cosine-weighted share of the sky that each point sees: diffuse light below over above.
+    def sky_visibility(
+        self, points_m: np.ndarray, *, n: int, seed: int, response: Response = COSINE
+    ) -> np.ndarray:
+        """What is left of an even sky's reading at each point: diffuse light below over above.
 
         Parameters
         ----------
         points_m : (p, 3) array
             Local frame [m].
         n : int
-            Rays per point, with a cosine law about the zenith.
+            Rays per point.
         seed : int
+        response : Response
+            Of level sensors at the points.
 
         Returns
         -------
         (p,) float32
             1 in the open.
         """
-        trace = sky_rays(self.scene, points_m, patches(1), seed=seed)
+        trace = sky_rays(self.scene, points_m, patches(1), seed=seed, response=response)
         return trace(np.arange(len(points_m)), 1, 0, n)[:, 0, 0] / np.float32(n)
 
 

@@ -61,7 +61,7 @@ def compute(
     sunlit : Sunlit
         Share of the solar disc that is seen at the times of the sky.
     transport : Transport
-        Counted paths of the same sensors.
+        Counted paths of the same sensors, and how these respond.
     sky : xarray.Dataset
         Sun and sky at t times in b bands.
     optics : Optics
@@ -82,7 +82,7 @@ def compute(
     from_sky, scattered, variance = (
         np.concatenate(part, axis=1) for part in zip(*blocks, strict=True)
     )
-    beam = level_beam(sky)
+    beam = level_beam(sky, transport.response)
     # Shadow rays and paths are drawn independently: their variances add.
     return Light(
         direct=sunlit.share.mean(axis=0) * beam,

@@ -13,6 +13,8 @@ import numpy as np
 from scipy import sparse
 
 from dapple.frames import direction_from_angles
+from dapple.optics import sensor_response
+from dapple.optics.responses import COSINE, Response
 from dapple.scene.counters import Counters
 from dapple.scene.scene_optics import Optics
 from dapple.sky.patches import Patches, patches
@@ -32,7 +34,7 @@ class Transport:
     Attributes
     ----------
     sky_seen : (n_sensors, r, p) float32
-        Share of every sky patch that each sensor sees, weighted by the cosine, in independent
+        Share of every sky patch that each sensor sees, weighted by its response, in independent
         replicates; with voxels the transmittance.
     sensor, replicate, patch : (k,) int32
         Where a path started, in which independent set, and in which sky patch it left.
@@ -48,6 +50,8 @@ class Transport:
         Most surfaces on a path.
     counters : Counters
         What is counted.
+    response : Response
+        Of the sensors: paths start as often in a direction as light from there counts.
     """
 
     sky_seen: np.ndarray
@@ -60,6 +64,7 @@ class Transport:
     cut: np.ndarray
     max_orders: int
     counters: Counters
+    response: Response = COSINE
 
     @property
     def n_replicates(self) -> int:
@@ -95,8 +100,8 @@ def nominal_error(transport: Transport, optics: Optics, *, sun_kernel_deg: float
     Returns
     -------
     (n_sensors,) float64
-        As a share of the open sky's light, the largest one of clear skies or half of that of an
-        overcast sky of even radiance: without sun the light has no error but this.
+        As a share of the open sky's light on the level, the largest one of clear skies or half of
+        that of an overcast sky of even radiance: without sun the light has no error but this.
     """
     sky = patches(transport.n_patches)
     overcast, clear, suns = _nominal_skies(sky)
@@ -107,17 +112,19 @@ def nominal_error(transport: Transport, optics: Optics, *, sun_kernel_deg: float
     return _nominal_error(scattered_variance(light, transport.n_paths))
 
 
-def nominal_straight_error(sky_seen: np.ndarray) -> np.ndarray:
+def nominal_straight_error(sky_seen: np.ndarray, response: Response = COSINE) -> np.ndarray:
     """Standard error of light straight from nominal skies, like `nominal_error`.
 
     Parameters
     ----------
     sky_seen : (n_sensors, r, p) float32
         Share of every sky patch that sensors see.
+    response : Response
+        Of the sensors.
     """
     sky = patches(sky_seen.shape[2])
     overcast, clear, _ = _nominal_skies(sky)
-    light = _straight(sky_seen, np.concatenate([overcast, clear]))
+    light = _straight(sky_seen, np.concatenate([overcast, clear]), response)
     return _nominal_error(light.var(axis=1, ddof=1) / light.shape[1])
 
 
@@ -167,7 +174,7 @@ def _nominal_skies(sky: Patches) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def straight(transport: Transport, radiance: np.ndarray) -> np.ndarray:
-    """Irradiance at the sensors straight from a sky.
+    """What sensors read straight from a sky.
 
     Parameters
     ----------
@@ -181,20 +188,20 @@ def straight(transport: Transport, radiance: np.ndarray) -> np.ndarray:
     (n_sensors, r, t) float64
         In units of the radiance times sr.
     """
-    return _straight(transport.sky_seen, radiance)
+    return _straight(transport.sky_seen, radiance, transport.response)
 
 
-def _straight(sky_seen: np.ndarray, radiance: np.ndarray) -> np.ndarray:
+def _straight(sky_seen: np.ndarray, radiance: np.ndarray, response: Response) -> np.ndarray:
     """As `straight`, of the share of sky patches (n_sensors, r, p) that sensors see."""
     n_patches = sky_seen.shape[2]
-    weight = radiance * patches(n_patches).projected_solid_angle_sr
+    weight = radiance * patches(n_patches).seen_solid_angle_sr(response)
     # One product of two matrices is much faster than many of a stack.
     table = sky_seen.reshape(-1, n_patches).astype(np.float64) @ weight.T
     return table.reshape(*sky_seen.shape[:2], -1)
 
 
 def scattered(transport: Transport, radiance: np.ndarray, optics: Optics) -> np.ndarray:
-    """Irradiance at the sensors by light that met something, in every band.
+    """What sensors read of light that met something, in every band.
 
     Parameters
     ----------
@@ -221,7 +228,7 @@ def scattered(transport: Transport, radiance: np.ndarray, optics: Optics) -> np.
 def summed_scattered(
     transport: Transport, radiance: np.ndarray, flux: np.ndarray, optics: Optics
 ) -> np.ndarray:
-    """Irradiance at the sensors by light that met something, summed over the bands.
+    """What sensors read of light that met something, summed over the bands.
 
     Parameters
     ----------
@@ -253,13 +260,14 @@ def _by_kind(transport: Transport, radiance: np.ndarray):
     bounds = np.searchsorted(transport.sensor, np.arange(len(transport.n_paths) + 1))
     by_patch = np.ascontiguousarray(radiance.T)
     n_replicates = transport.n_replicates
+    reading_sr = sensor_response.integral_sr(transport.response)
 
     def pieces() -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
         for sensor in np.flatnonzero(np.diff(bounds)):
             rows = slice(bounds[sensor], bounds[sensor + 1])
             mine, own_kind = np.unique(kind[rows], return_inverse=True)
             row = transport.replicate[rows].astype(np.int64) * len(mine) + own_kind
-            weight = transport.count[rows] * (np.pi / transport.n_paths[sensor])
+            weight = transport.count[rows] * (reading_sr / transport.n_paths[sensor])
             counted = sparse.csr_array(
                 (weight, (row, transport.patch[rows])),
                 shape=(n_replicates * len(mine), transport.n_patches),

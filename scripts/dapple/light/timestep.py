@@ -1,13 +1,13 @@
 """Light at sensors at one time, by Mitsuba's own path tracers: the reference engine.
 
-A sensor is a level plane that answers to the cosine. Its irradiance is an integral of radiance
-over the upper hemisphere; each radiance comes from Mitsuba's `path` or `volpath` integrator,
-asked along rays that start at the sensor:
+A sensor is level and looks up. Its reading is an integral over the upper hemisphere of radiance
+times the sensor's response, with the cosine irradiance; each radiance comes from Mitsuba's `path`
+or `volpath` integrator, asked along rays that start at the sensor:
 
 * direct: rays to points of the sun's disc, no scattering. While they are traced every direction
   of the sky has the sun's radiance, so that a ray that gets out brings just that;
-* sky: rays with a cosine law, no scattering;
-* scattered: rays with a cosine law, light that comes straight from the sky left out. What
+* sky: rays drawn as often as light from there counts, no scattering;
+* scattered: rays drawn alike, light that comes straight from the sky left out. What
   scatters is lit by the sky and by parallel light: penumbras do not change its mean.
 """
 
@@ -20,6 +20,8 @@ import numpy as np
 from dapple import engine
 from dapple.errors import InputError
 from dapple.frames import direction_from_angles
+from dapple.optics import sensor_response
+from dapple.optics.responses import COSINE, Response
 from dapple.scene import patterns
 from dapple.scene.render_scene import RenderScene
 from dapple.streams import stream_seed
@@ -31,7 +33,7 @@ LIFT_M = 1e-3
 
 
 @dataclass(frozen=True)
-class Effort:
+class Rays:
     """How many rays each sensor gets; standard errors come from the replicates.
 
     Attributes
@@ -73,11 +75,12 @@ def timestep(
     diffuse_horizontal: np.ndarray,
     sky: Callable[[np.ndarray, np.ndarray], np.ndarray],
     sun_diameter_deg: float,
-    effort: Effort,
+    rays: Rays,
     seed: int,
     aperture_m: float = 0.0,
+    response: Response = COSINE,
 ) -> dict[str, np.ndarray]:
-    """Irradiance of level sensors under one sun and one sky.
+    """What level sensors read under one sun and one sky.
 
     Parameters
     ----------
@@ -95,10 +98,12 @@ def timestep(
         Relative radiance as a function of zenith and azimuth [deg].
     sun_diameter_deg : float
         Angular diameter of the sun's disc; 0 is a point [deg].
-    effort : Effort
+    rays : Rays
     seed : int
     aperture_m : float
         Diameter of the sensors' level entrance; 0 is a point [m].
+    response : Response
+        Of the sensors.
 
     Returns
     -------
@@ -118,17 +123,19 @@ def timestep(
     towards_sun = direction_from_angles(sun_zenith_deg, sun_azimuth_deg)
     if sun_zenith_deg >= 90.0:
         beam, towards_sun = np.zeros_like(beam), np.array([0.0, 0.0, 1.0])
-    dark = np.zeros((len(sensors), effort.replicates, 3))
+    dark = np.zeros((len(sensors), rays.replicates, 3))
     parts = {"direct": dark, "sky": dark, "scattered": dark}
     if beam.any() or diffuse.any():
         if beam.any():
             sine = max(np.sin(np.radians(0.5 * sun_diameter_deg)), POINT_SINE)
             scene.set_even_sky(beam / (np.pi * sine**2))
-            parts["direct"] = _direct(scene, sensors, towards_sun, sine, effort, aperture_m, seed)
+            parts["direct"] = _direct(
+                scene, sensors, towards_sun, sine, rays, aperture_m, response, seed
+            )
         scene.set_sun(towards_sun, beam)
         scene.set_sky(sky, diffuse)
         for part in ("sky", "scattered") if diffuse.any() else ("scattered",):
-            parts[part] = _hemisphere(scene, sensors, part, effort, aperture_m, seed)
+            parts[part] = _hemisphere(scene, sensors, part, rays, aperture_m, response, seed)
     return _summary(parts, scene.n_bands)
 
 
@@ -151,19 +158,20 @@ def _direct(
     sensors: np.ndarray,
     towards_sun: np.ndarray,
     sine: float,
-    effort: Effort,
+    rays: Rays,
     aperture_m: float,
+    response: Response,
     seed: int,
 ) -> np.ndarray:
-    """(n, replicates, 3) irradiance by rays to points of the sun's disc, its radius a sine."""
+    """(n, replicates, 3) reading by rays to points of the sun's disc, its radius a sine."""
     seed = stream_seed(seed, "direct")
-    square = patterns.shifted(effort.direct, 4, (len(sensors), effort.replicates), seed)
+    square = patterns.shifted(rays.direct, 4, (len(sensors), rays.replicates), seed)
     start = _starts(sensors, square[..., 2:], aperture_m)
     # even in the disc as it is seen from below: the cosine with its axis weighs solid angle
     flat = sine * patterns.disc(square[..., :2])
     axial = np.sqrt(1.0 - (flat**2).sum(axis=-1, keepdims=True))
     way = flat @ _across(towards_sun) + axial * towards_sun
-    weight = np.pi * sine**2 / axial * np.maximum(way[..., 2:], 0.0)
+    weight = np.pi * sine**2 / axial * sensor_response.value(response, way[..., 2:])
     integrator = {"type": scene.integrator, "max_depth": 1}
     radiance = _radiance(scene, integrator, start, way, way[..., 2] > 0.0, seed)
     return (radiance * weight).mean(axis=2)
@@ -173,25 +181,29 @@ def _hemisphere(
     scene: RenderScene,
     sensors: np.ndarray,
     part: str,
-    effort: Effort,
+    rays: Rays,
     aperture_m: float,
+    response: Response,
     seed: int,
 ) -> np.ndarray:
-    """(n, replicates, 3) irradiance of the sky or of scattered light by rays with a cosine law."""
+    """(n, replicates, 3) reading of the sky or of scattered light."""
     seed = stream_seed(seed, part)
     integrator = {"type": scene.integrator, "max_depth": 1}
     if part == "scattered":
         integrator |= {
-            "max_depth": effort.max_depth,
-            "rr_depth": effort.roulette_depth,
+            "max_depth": rays.max_depth,
+            "rr_depth": rays.roulette_depth,
             "hide_emitters": True,
         }
-    n_rays = effort.sky if part == "sky" else effort.scattered
-    square = patterns.shifted(n_rays, 4, (len(sensors), effort.replicates), seed)
+    n_rays = rays.sky if part == "sky" else rays.scattered
+    square = patterns.shifted(n_rays, 4, (len(sensors), rays.replicates), seed)
     start = _starts(sensors, square[..., 2:], aperture_m)
-    way = patterns.cosine_hemisphere(square[..., :2])
+    flat = patterns.disc(square[..., :2])
+    way = sensor_response.directions(response, *np.moveaxis(flat, -1, 0), (flat**2).sum(axis=-1))
+    way = np.stack(way, axis=-1)
     seen = np.ones(way.shape[:-1], dtype=bool)
-    return np.pi * _radiance(scene, integrator, start, way, seen, seed).mean(axis=2)
+    radiance = _radiance(scene, integrator, start, way, seen, seed)
+    return sensor_response.integral_sr(response) * radiance.mean(axis=2)
 
 
 def _radiance(

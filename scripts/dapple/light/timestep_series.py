@@ -9,7 +9,8 @@ import xarray as xr
 
 from dapple.formats import netcdf
 from dapple.light.light_datasets import dataset
-from dapple.light.timestep import Effort, timestep
+from dapple.light.timestep import Rays, timestep
+from dapple.optics.responses import COSINE, Response
 from dapple.scene import mitsuba_scene
 from dapple.scene.render_scene import RenderScene
 from dapple.scene.scene_optics import Optics, group_bands, group_flux
@@ -35,8 +36,10 @@ class Reference:
         Of the solar disc [deg].
     aperture_m : float
         Diameter of the sensors' receiving discs [m].
+    response : Response
+        Of the sensors.
     replicates, direct_rays, sky_rays, scattered_rays, max_depth : int
-        See `Effort`.
+        See `Rays`.
     """
 
     def __init__(
@@ -53,15 +56,17 @@ class Reference:
         scattered_rays: int,
         max_depth: int,
         aperture_m: float,
+        response: Response = COSINE,
         variant: str,
         seed: int,
     ):
         self.scenes, self.sky, self.n_bands, self.seed = scenes, sky, bands, seed
-        self.effort = Effort(replicates, direct_rays, sky_rays, scattered_rays, max_depth)
+        self.rays = Rays(replicates, direct_rays, sky_rays, scattered_rays, max_depth)
         self.beam = sky["beam_normal_umol_m2_s"].transpose("time", "band").to_numpy()
         self.diffuse = sky["diffuse_horizontal_umol_m2_s"].transpose("time", "band").to_numpy()
         self.optics, self.group = group_bands(optics, self.beam, self.diffuse, bands)
         self.sun_diameter_deg, self.aperture_m = sun_diameter_deg, aperture_m
+        self.response = response
         self.variant = variant
 
     @cached_property
@@ -89,8 +94,9 @@ class Reference:
                 diffuse_horizontal=group_flux(self.diffuse[index], self.group, self.n_bands),
                 sky=self._radiance(index),
                 sun_diameter_deg=self.sun_diameter_deg,
-                effort=self.effort,
+                rays=self.rays,
                 aperture_m=self.aperture_m,
+                response=self.response,
                 seed=stream_seed(self.seed, placement, index),
             )
             for placement, scene in enumerate(self.rendered)

@@ -13,6 +13,7 @@ import pandas as pd
 from dapple.light.paths import Paths, trace
 from dapple.light.rays_to_sky import sky_rays
 from dapple.light.tensor import Transport, nominal_error, nominal_straight_error
+from dapple.optics.responses import COSINE, Response
 from dapple.scene.counters import Counters
 from dapple.scene.scene_optics import Optics
 from dapple.scene.traced import TracedScene
@@ -57,6 +58,7 @@ def collect(
     growth: Growth | None = None,
     halved_after: int | None = None,
     aperture_m: float = 0.0,
+    response: Response = COSINE,
     n_replicates: int = N_REPLICATES,
 ) -> Transport:
     """Trace rays to the sky and paths from each sensor, in equal parts for every replicate.
@@ -79,7 +81,7 @@ def collect(
         Straight rays to the sky of each sensor at first, at least one to a patch and replicate.
     growth : Growth or None
         When more rays and paths are traced. None: the first are enough.
-    halved_after, aperture_m
+    halved_after, aperture_m, response
         See `paths.trace`. Rays to the sky start at the middle of the aperture.
     n_replicates : int
         Independent sets, at least 2.
@@ -92,7 +94,8 @@ def collect(
     sky = patches(n_patches)
 
     def look(done: np.ndarray, wanted: np.ndarray, seen: np.ndarray | None) -> np.ndarray:
-        rays = sky_rays(scene, sensors_m, sky, seed=stream_seed(seed, "sky"))
+        seed_of_sky = stream_seed(seed, "sky")
+        rays = sky_rays(scene, sensors_m, sky, seed=seed_of_sky, response=response)
         if seen is None:
             seen = np.zeros((len(sensors_m), n_replicates, sky.n), np.float32)
         for number, target in sorted({*zip(done.tolist(), wanted.tolist(), strict=True)}):
@@ -112,17 +115,21 @@ def collect(
             seed=stream_seed(seed, "paths"),
             halved_after=halved_after,
             aperture_m=aperture_m,
+            response=response,
         )
-        more = _tallied(paths, scene.counters, wanted - done, seen, max_orders)
+        more = _tallied(paths, scene.counters, wanted - done, seen, max_orders, response)
         return more if counted is None else _added(counted, more)
 
     def scattered_error(counted: Transport) -> np.ndarray:
         assert growth is not None  # only then it is asked
         return nominal_error(counted, growth.optics, sun_kernel_deg=growth.sun_kernel_deg)
 
+    def straight_error(seen: np.ndarray) -> np.ndarray:
+        return nominal_straight_error(seen, response)
+
     n = len(sensors_m)
     first = -(-n_sky_rays // (n_replicates * sky.n)), -(-n_paths // n_replicates)
-    seen = _grown(look, nominal_straight_error, first[0], n, growth)
+    seen = _grown(look, straight_error, first[0], n, growth)
     return _grown(count, scattered_error, first[1], n, growth)
 
 
@@ -152,7 +159,12 @@ def _grown(
 
 
 def _tallied(
-    paths: Paths, counters: Counters, n_paths: np.ndarray, seen: np.ndarray, max_orders: int
+    paths: Paths,
+    counters: Counters,
+    n_paths: np.ndarray,
+    seen: np.ndarray,
+    max_orders: int,
+    response: Response,
 ) -> Transport:
     """Paths of the same start, patch and orders as one row with their number."""
     _, n_replicates, n_patches = seen.shape
@@ -177,6 +189,7 @@ def _tallied(
         paths.cut.reshape(-1, n_replicates).sum(axis=1),
         max_orders,
         counters,
+        response,
     )
 
 

@@ -8,6 +8,7 @@ import xarray as xr
 
 from dapple.formats import netcdf
 from dapple.light.tensor import Transport
+from dapple.optics.responses import COSINE, Response
 from dapple.scene.counters import KINDS, Counters
 
 ROWS = {
@@ -42,6 +43,8 @@ def write(path: str | Path, transport: Transport) -> None:
     variables["sky_seen"] = (("start", "set", "sky_patch"), transport.sky_seen, about)
     variables["orders"][2]["long_name"] += ": " + ", ".join(transport.counters.names)
     attributes = {"max_orders": transport.max_orders} | transport.counters.attributes
+    if transport.response != COSINE:
+        attributes["response"] = np.ravel(transport.response)
     dataset = xr.Dataset(variables, attrs=attributes)
     compressed = {"zlib": True, "complevel": 1, "shuffle": True}
     netcdf.store(path, dataset, dict.fromkeys(variables, compressed))
@@ -59,4 +62,16 @@ def read(path: str | Path) -> Transport:
     dataset = netcdf.read(path, names, ("max_orders", *KINDS))
     columns = {name: dataset[name].to_numpy() for name in names}
     counters = Counters.from_attributes(dataset.attrs)
-    return Transport(**columns, max_orders=int(dataset.attrs["max_orders"]), counters=counters)
+    return Transport(
+        **columns,
+        max_orders=int(dataset.attrs["max_orders"]),
+        counters=counters,
+        response=_response(dataset),
+    )
+
+
+def _response(dataset: xr.Dataset) -> Response:
+    """Of the sensors; files of sensors that respond to the cosine say nothing about it."""
+    if "response" not in dataset.attrs:
+        return COSINE
+    return tuple(map(tuple, dataset.attrs["response"].reshape(-1, 2).tolist()))

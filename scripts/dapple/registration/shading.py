@@ -10,9 +10,10 @@ import xarray as xr
 
 from dapple.errors import InputError
 from dapple.light import rays_to_sky
+from dapple.optics.responses import Response
 from dapple.registration import fit
 from dapple.scene.surfaces import Scene
-from dapple.sky.open_sky import level_beam, towards_sun
+from dapple.sky.open_sky import level_beam, level_diffuse, towards_sun
 
 FINE_STEP_S = 120.0
 """Times of the simulated shade; the sun moves by half its disc in a minute."""
@@ -32,6 +33,7 @@ def register(
     fit_share: float,
     sun_diameter_deg: float,
     aperture_m: float,
+    response: Response,
     gain: str,
     variant: str,
     seed: int,
@@ -57,6 +59,8 @@ def register(
     sun_diameter_deg, aperture_m : float
         Angular diameter of the sun [deg], diameter of the level disc around each sensor over
         which light is averaged [m].
+    response : Response
+        Of the sensors.
     gain : {"none", "site"}
         Whether to fit `open_sky_gain` on the fitting part.
 
@@ -76,10 +80,10 @@ def register(
     )
     sky = sky_at(fine)
     sun = towards_sun(sky)
-    beam = level_beam(sky)
-    diffuse = sky["diffuse_horizontal_umol_m2_s"].sum("band").to_numpy()
+    beam, diffuse = level_beam(sky, response), level_diffuse(sky, response)
     disc: dict[str, Any] = {"n_disc": N_DISC, "seed": seed}
     disc |= {"sun_diameter_deg": sun_diameter_deg, "aperture_m": aperture_m}
+    dome: dict[str, Any] = {"n": N_SKY, "seed": seed, "response": response}
     tracers = [rays_to_sky.Tracer(scene, variant) for scene in scenes]
 
     def seen(shifts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -88,7 +92,7 @@ def register(
         moved[:, :, :2] -= shifts[:, None, :]
         moved = moved.reshape(-1, 3)
         sunlit = np.mean([t.sun_visibility(moved, sun, **disc) for t in tracers], axis=0)
-        open_sky = np.mean([t.sky_visibility(moved, n=N_SKY, seed=seed) for t in tracers], axis=0)
+        open_sky = np.mean([t.sky_visibility(moved, **dome) for t in tracers], axis=0)
         shape = len(shifts), len(points_m), -1
         return sunlit.reshape(shape), open_sky.reshape(shape)
 

@@ -6,6 +6,8 @@ from functools import cache, cached_property
 import numpy as np
 
 from dapple.errors import InputError
+from dapple.optics import sensor_response
+from dapple.optics.responses import COSINE, Response
 
 # Patches in each row of Tregenza's sky, from the horizon up; the zenith patch comes last.
 TREGENZA_ROWS = (30, 30, 24, 24, 18, 12, 6)
@@ -48,7 +50,12 @@ class Patches:
     @cached_property
     def projected_solid_angle_sr(self) -> np.ndarray:
         """(n,) solid angles weighted with the cosine of the zenith angle [sr], in sum π."""
-        return self._per_patch(np.pi * np.diff(self.row_sine**2))
+        return self.seen_solid_angle_sr(COSINE)
+
+    def seen_solid_angle_sr(self, response: Response) -> np.ndarray:
+        """(n,) solid angles weighted with the response of a level sensor [sr]."""
+        share = np.diff(sensor_response.share_below(response, self.row_sine))
+        return self._per_patch(sensor_response.integral_sr(response) * share)
 
     @cached_property
     def directions(self) -> np.ndarray:

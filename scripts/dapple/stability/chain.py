@@ -228,7 +228,8 @@ class Chain:
 
     def open_sky(self, conditions: Conditions) -> np.ndarray:
         """(t,) PAR without a tree, by the right clock [µmol m⁻² s⁻¹]."""
-        return open_sky_par(self.sky(true_conditions(conditions))).to_numpy()
+        response = Tracing(**self.setup.light["tracing"]).response
+        return open_sky_par(self.sky(true_conditions(conditions)), response).to_numpy()
 
 
 STAGE_OF = {

@@ -11,6 +11,7 @@ from dapple.errors import InputError
 from dapple.formats.meshes import empty
 from dapple.formats.netcdf import times
 from dapple.light import light_datasets
+from dapple.light.light_model import Tracing
 from dapple.light.series import Light
 from dapple.stability.chain import Chain, true_conditions
 from dapple.stability.stressors import Conditions, Level, Stressor
@@ -181,7 +182,7 @@ def run_data(
         light_datasets.as_dataset(truth, labels, stamps), seed=stream_seed(chain.seed, "records")
     )
     recorded["time"] = recorded["time"].dt.tz_localize(None)  # as in datasets
-    tracing = chain.setup.light["tracing"]
+    tracing = Tracing(**chain.setup.light["tracing"])
     return with_light(
         run,
         {name: light_datasets.as_dataset(own, labels, stamps) for name, own in light.items()},
@@ -189,8 +190,9 @@ def run_data(
         sensors_m=sensors_m,
         sky=chain.sky(conditions),
         measured_umol_m2_s=recorded.set_index(["sensor", "time"])["par_umol_m2_s"].to_xarray(),
-        sun_diameter_deg=tracing["sun_diameter_deg"],
-        aperture_m=tracing["aperture_m"],
+        sun_diameter_deg=tracing.sun_diameter_deg,
+        aperture_m=tracing.aperture_m,
+        response=tracing.response,
         seed=stream_seed(chain.seed, "shift"),
     )
 

@@ -10,6 +10,7 @@ from dapple.formats.clouds import LEAF, Cloud
 from dapple.formats.meshes import Mesh
 from dapple.formats.shots import Shots
 from dapple.light.moved_sensors import moved_light
+from dapple.optics.responses import Response
 from dapple.scene.traced import TracedScene
 
 N_TIMES = 24
@@ -66,6 +67,7 @@ def with_light(
     measured_umol_m2_s: xr.DataArray | None,
     sun_diameter_deg: float,
     aperture_m: float,
+    response: Response,
     seed: int,
 ) -> RunData:
     """Add light at some times of the day, at the sensors and beside them.
@@ -85,6 +87,8 @@ def with_light(
         Records (sensor, time).
     sun_diameter_deg, aperture_m : float
         As in `visibility.sunlit`.
+    response : Response
+        Of the sensors.
     seed : int
         Chooses the directions in which sensors are moved.
     """
@@ -103,6 +107,7 @@ def with_light(
                 seed=seed,
                 sun_diameter_deg=sun_diameter_deg,
                 aperture_m=aperture_m,
+                response=response,
             )
             for name, one in light.items()
         },

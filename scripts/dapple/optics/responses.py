@@ -1,0 +1,71 @@
+"""Responses of light sensors, by name or from a table: how much light counts from where.
+
+A response is pairs of an angle from the normal of the sensor, which looks up, and the response
+there over that at the normal: from 0 to 90 degrees, between two angles linear in the cosine of the
+angle. Light from below the plane of the sensor does not count. `dapple.optics.sensor_response` says
+what follows. No import here needs numpy: the configuration takes the names from this module.
+"""
+
+import csv
+import itertools
+import math
+from pathlib import Path
+
+from dapple.errors import InputError
+
+Response = tuple[tuple[float, float], ...]
+
+COSINE: Response = ((0.0, 1.0), (90.0, 0.0))
+"""Flux through a level plane."""
+NAMED: dict[str, Response] = {
+    "cosine": COSINE,
+    # Scalar irradiance of the upper hemisphere: light counts 1 wherever it comes from.
+    "hemispherical": ((0.0, 1.0), (90.0, 1.0)),
+}
+COLUMNS = ("angle_deg", "response")
+
+
+def read(path: str | Path) -> Response:
+    """Read the response of a sensor as it was measured.
+
+    Parameters
+    ----------
+    path : path
+        CSV with `angle_deg` from the normal, from 0 to 90 in ascending order, and `response` in any
+        unit.
+
+    Returns
+    -------
+    tuple of (float, float)
+        Response over that at the normal: a sensor reads light from above right.
+
+    Raises
+    ------
+    InputError
+        Another file; angles that do not ascend from 0 to 90; a response that is not positive, but
+        for 0 at 90 degrees.
+    """
+    try:
+        with Path(path).open(newline="", encoding="utf-8-sig") as file:
+            rows = [[float(row[name]) for name in COLUMNS] for row in csv.DictReader(file)]
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            path, f"{error}", "numbers in the columns angle_deg and response", "Correct it."
+        ) from error
+    angles, values = zip(*rows, strict=True) if rows else ((), ())
+    steps = itertools.pairwise(angles)
+    if angles[:1] != (0.0,) or angles[-1] != 90.0 or any(b <= a for a, b in steps):
+        raise InputError(
+            path,
+            f"angles {', '.join(f'{angle:g}' for angle in angles) or 'of no row'}",
+            "from 0 to 90 degrees, ascending",
+            "Add or sort the rows.",
+        )
+    if not all(0 < value < math.inf for value in values[:-1]) or not 0 <= values[-1] < math.inf:
+        raise InputError(
+            path,
+            f"responses {', '.join(f'{value:g}' for value in values)}",
+            "all positive; 0 only at 90 degrees",
+            "Leave out rows of no light, or write a small number.",
+        )
+    return tuple((angle, value / values[0]) for angle, value in rows)
