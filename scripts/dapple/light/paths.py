@@ -124,7 +124,7 @@ def _trace_block(scene, points, start, number, response, seed, max_orders, halve
     state, sequence = mi.sample_tea_32(point + number, shift)
     rng = mi.PCG32(initstate=mi.UInt64(state), initseq=mi.UInt64(sequence))
     flat = mi.warp.square_to_uniform_disk_concentric(_stratified(mi, point, shift, number))
-    first = sensor_response.directions(response, *flat, dr.squared_norm(flat), dr)
+    first = sensor_response.directions(response, flat.x, flat.y, dr.squared_norm(flat), dr)
     on_disc = mi.warp.square_to_uniform_disk(mi.Point2f(rng.next_float32(), rng.next_float32()))
     centre = mi.Point3f(*(dr.gather(mi.Float, axis, start) for axis in points))
     origin = centre + radius * mi.Vector3f(on_disc.x, on_disc.y, 0)

@@ -42,7 +42,8 @@ def write(path: str | Path, transport: Transport) -> None:
     about = {"units": "1", "long_name": SKY}
     variables["sky_seen"] = (("start", "set", "sky_patch"), transport.sky_seen, about)
     variables["orders"][2]["long_name"] += ": " + ", ".join(transport.counters.names)
-    attributes = {"max_orders": transport.max_orders} | transport.counters.attributes
+    attributes: dict[str, Any] = {"max_orders": transport.max_orders}
+    attributes |= transport.counters.attributes
     if transport.response != COSINE:
         attributes["response"] = np.ravel(transport.response)
     dataset = xr.Dataset(variables, attrs=attributes)
