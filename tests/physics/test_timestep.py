@@ -273,7 +273,7 @@ def test_an_entrance_across_the_border_of_the_medium_is_shaded_as_a_whole():
     sensors = np.array([[x, 0.0, 1.0] for x in (-0.8, -0.6, -0.5, -0.4)])
     found = light(
         scene, sensors, zenith=60.0, azimuth=90.0, aperture_m=0.8,
-        effort=effort(direct=1024), diffuse=0.0 * DIFFUSE,
+        rays=rays(direct=1024), diffuse=0.0 * DIFFUSE,
     )  # fmt: skip
     expected = 0.5 * BEAM * np.exp(-0.5 * 3.0 * 0.5 / np.sin(np.radians(60.0)))
     assert found["direct"] == pytest.approx(np.tile(expected, (4, 1)), rel=0.03)
