@@ -9,6 +9,9 @@ Makes   check.json, check.html   facts and findings, each with the lines of YAML
 
 INPUT = {
     "cloud": data(settings.cloud.path) if settings.source == "cloud" else [],
+    "positions": (
+        data(settings.cloud.scan_positions) if settings.cloud.scan_positions else []
+    ),
     "sensors": data(settings.sensors.path) if settings.sensors.kind == "table" else [],
 }
 

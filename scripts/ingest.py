@@ -1,12 +1,7 @@
 """Read a real point cloud, and its shots where misses are recorded or can be rebuilt."""
 
-import pandas as pd
-
-from dapple.cloud import ordered, selection
-from dapple.cloud.ingest import shots_from_scan
-from dapple.cloud.lattice import ScanFrame
+from dapple.cloud import selection, shot_sources
 from dapple.formats import clouds, json, shots
-from dapple.frames import to_local
 from dapple.workflow import run
 
 
@@ -22,32 +17,26 @@ def main(snakemake):
     print(*source.notes, sep="\n")
     clouds.write(snakemake.output.points, cloud)
     json.write(snakemake.output.frame, {"origin_m": cloud.origin_m, "crs": source.crs})
-    facts = {"scans": []}
-    match params.shots:
-        case "recorded":
-            fired = _recorded(path, cloud.origin_m, facts)
-            shots.write_chunks(snakemake.output.shots, fired, facts)
-        case "scan_frame":
-            position_m = _scan_position(snakemake.input.positions, cloud)
-            frame = ScanFrame(**params.scan_frame)
-            fired, facts = shots_from_scan(cloud, position_m, frame, source=path)
-            shots.write(snakemake.output.shots, fired, {"scans": facts})
-        case "none":
-            return
-    print(facts)
+    if params.shots != "none":
+        fired, moving = shot_sources.open_shots(
+            path,
+            cloud,
+            source,
+            how=params.shots,
+            positions=snakemake.input.positions,
+            scan_frame=params.scan_frame,
+        )
+        facts = {"scans": []}
+        pieces = _pieces(fired, facts)
+        shots.write_chunks(snakemake.output.shots, pieces, facts, moving=moving)
+        print(facts)
 
 
-def _recorded(path, origin_m, facts):
-    """The shots of every scan, in pieces; facts of the scans are noted on the way."""
-    for fired, fact in ordered.shots_from_file(path, origin_m):
+def _pieces(fired, facts):
+    """Shots in pieces; facts of the scans are noted on the way."""
+    for of_scan, fact in fired:
         facts["scans"].append(fact)
-        yield from shots.parts(fired)
-
-
-def _scan_position(path, cloud):
-    """The scanner stands at the cloud's own zero where no table says otherwise."""
-    world_m = pd.read_csv(path)[["x", "y", "z"]].to_numpy()[0] if path else [0.0, 0.0, 0.0]
-    return to_local(world_m, cloud.origin_m)
+        yield from shots.parts(of_scan)
 
 
 if __name__ == "__main__":

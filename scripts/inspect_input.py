@@ -11,7 +11,8 @@ from dapple.workflow import options, run
 
 def main(snakemake):
     settings, inputs = options(snakemake.params), snakemake.input
-    check = inspect(settings, cloud=inputs.cloud, sensors=inputs.sensors)
+    files = {name: getattr(inputs, name) for name in ("cloud", "positions", "sensors")}
+    check = inspect(settings, **files)
     json.write(snakemake.output.json, check)
     with atomic(snakemake.output.html) as partial:
         partial.write_text(page.page(json.read(snakemake.output.json)))

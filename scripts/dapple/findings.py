@@ -8,6 +8,8 @@ from typing import Literal
 
 from dapple.errors import InputError
 
+Level = Literal["error", "warning", "note"]
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -25,7 +27,7 @@ class Finding:
         Lines of a configuration that mend it, to paste; empty where no key does.
     """
 
-    level: Literal["error", "warning", "note"]
+    level: Level
     where: str
     found: str
     expected: str = ""

@@ -12,8 +12,8 @@ from pye57 import libe57
 
 from dapple.cloud import selection
 from dapple.errors import EmptyCloudError, InputError
-from dapple.formats import cloud_ply, clouds
-from dapple.formats.cloud_raw import AT_SCANNER
+from dapple.formats import clouds
+from dapple.formats.cloud_raw import AT_SCANNER, MISSED
 
 XYZ = np.round(np.random.default_rng(4).uniform(-2, 9, (400, 3)), 4)
 
@@ -361,23 +361,24 @@ def ray_cloud(path, start, end, met):
     return path
 
 
-def test_rays_that_met_nothing_are_no_points_but_rays(tmp_path):
+def test_rays_that_met_nothing_are_no_points_but_shots(tmp_path):
     met = np.arange(400) % 4 > 0
     start = np.array([1.0, 2.0, 1.5]) + np.zeros((400, 3))
     path = ray_cloud(tmp_path / "a.ply", start, XYZ, met)
     cloud, source = clouds.read_with_source(path)
     assert cloud.xyz_m == pytest.approx(XYZ[met])
-    assert source.left_out == {"ray that met nothing": 100}
-    rays = cloud_ply.read_rays(path)
-    assert rays.start_m == pytest.approx(start, abs=1e-5)
-    assert np.array_equal(rays.met, met)
+    assert source.left_out == {MISSED: 100}
+    fired = clouds.fired(path)
+    assert fired.origin_m == pytest.approx(start, abs=1e-5)
+    assert np.array_equal(np.diff(fired.first), met)
+    assert fired.return_xyz_m == pytest.approx(XYZ[met], abs=1e-5)
 
 
 def test_a_cloud_with_normals_and_colours_is_no_ray_cloud(tmp_path):
     unit = np.tile([0.0, 0.6, 0.8], (400, 1))
     path = ray_cloud(tmp_path / "a.ply", XYZ + unit, XYZ, np.zeros(400, bool))
     assert len(clouds.read(path)) == 400
-    assert cloud_ply.read_rays(path) is None
+    assert clouds.fired(path) is None
 
 
 # --- text -----------------------------------------------------------------------------------

@@ -146,28 +146,6 @@ def test_a_scanner_in_the_wrong_place_is_refused(rebuilt):
         ingest.shots_from_scan(cloud, SCANNER + 0.5, FRAME)
 
 
-def test_level_scanners_need_no_more_than_positions_and_step():
-    parts, positions, empty = [], np.array([SCANNER, SCANNER + np.array([0, 0, 1])]), []
-    for number, position in enumerate(positions, 1):
-        zenith = np.radians(np.arange(30, 120.1, 2.0))
-        azimuth = np.radians(np.arange(0, 360, 2.0))
-        z, a = np.meshgrid(zenith, azimuth)
-        direction = np.stack([np.sin(z) * np.cos(a), np.sin(z) * np.sin(a), np.cos(z)], -1)
-        distance = trees(direction)
-        hit = np.isfinite(distance)
-        empty.append((~hit).sum())
-        xyz = position + direction[hit] * distance[hit, None]
-        parts.append((xyz, np.full(len(xyz), number)))
-    cloud = Cloud(
-        np.concatenate([xyz for xyz, _ in parts]),
-        attributes={"PointSourceId": np.concatenate([number for _, number in parts])},
-    )
-    shots, facts = ingest.rebuild_shots(cloud, positions, 2.0, lowest_miss_zenith_deg=180.0)
-    misses = [((shots.scan == k) & (shots.n_returns == 0)).sum() for k in (1, 2)]
-    assert misses == pytest.approx(empty, rel=0.01)
-    assert [fact["scan"] for fact in facts] == [1, 2]
-
-
 def test_a_handful_of_points_is_no_scan():
     with pytest.raises(EmptyCloudError, match="10 points"):
         ingest.shots_from_scan(Cloud(np.ones((10, 3))), np.zeros(3), FRAME)

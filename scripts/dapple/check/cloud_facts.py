@@ -9,7 +9,7 @@ import pandas as pd
 
 from dapple.cloud import ground_finder, selection, trees
 from dapple.formats import ground_surface
-from dapple.formats.cloud_raw import Source
+from dapple.formats.cloud_raw import MISSED, Source
 from dapple.formats.clouds import Cloud
 from dapple.formats.ground_surface import GroundSurface
 from dapple.structure.polygon_sizes import spacing_m
@@ -132,9 +132,8 @@ def step_m(xyz_m: np.ndarray, stated: float | None) -> float:
 def likely_scanner(cloud: Cloud, source: Source) -> str:
     """What kind of scanner the attributes and the geometry speak for."""
     names = set(cloud.attributes)
-    reason = "ray that met nothing"
-    if reason in source.left_out:
-        return "handheld or moving scanner (a ray cloud)"
+    if source.left_out.get(MISSED) and not source.scans:
+        return "shots told one by one: a ray cloud, or a table of shots"
     several = int(cloud.attributes.get("NumberOfReturns", np.ones(1)).max()) > 1
     if {"Reflectance", "Deviation"} <= names:
         return "RIEGL (reflectance and deviation)"

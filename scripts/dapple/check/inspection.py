@@ -15,7 +15,11 @@ COLUMNS = ("sensor_column", "x_column", "y_column", "z_column", "decimal")
 
 
 def inspect(
-    settings: dict[str, Any], *, cloud: str | Path = "", sensors: str | Path = ""
+    settings: dict[str, Any],
+    *,
+    cloud: str | Path = "",
+    positions: str | Path = "",
+    sensors: str | Path = "",
 ) -> dict[str, Any]:
     """Look at the files of a run.
 
@@ -23,7 +27,7 @@ def inspect(
     ----------
     settings : dict
         Sections of the configuration by name, as `Settings.model_dump` gives them.
-    cloud, sensors : path
+    cloud, positions, sensors : path
         Files; empty where the run reads none.
 
     Returns
@@ -40,7 +44,7 @@ def inspect(
         check["misses"] = shots_check.misses(facts, settings)
         check["can"] = abilities.of(facts, settings)
         found += cloud_findings.judge(facts, settings, cloud)
-        found += shots_check.judge(facts, settings, cloud)
+        found += shots_check.judge(facts, settings, cloud, positions)
         found += _choice(facts, settings)
         if sensors:
             origin_m = settings["registration"]["origin_m"]

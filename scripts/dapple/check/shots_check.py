@@ -1,6 +1,7 @@
 """Whether shots that met nothing are known, and whether those that are recorded tell the truth."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,10 +9,11 @@ import numpy as np
 
 from dapple import findings
 from dapple.check.cloud_facts import CloudFacts
-from dapple.cloud import ordered
+from dapple.cloud import ordered, scan_windows, shot_sources
 from dapple.errors import InputError
 from dapple.findings import Finding
 from dapple.formats import clouds
+from dapple.formats.cloud_raw import MISSED
 from dapple.formats.ordered_scan import OrderedScan
 from dapple.structure import traversal
 from dapple.structure.voxels import Grid, Sums, accumulate
@@ -31,20 +33,26 @@ from several sides and distances differ by a quarter."""
 def misses(facts: CloudFacts, settings: dict[str, Any]) -> str:
     """Whether shots without return are recorded, can be rebuilt, or are unknown."""
     recorded = any(scan.shots and scan.shots > scan.points for scan in facts.source.scans)
-    if recorded or "ray that met nothing" in facts.source.left_out:
+    if recorded or facts.source.left_out.get(MISSED):
         return RECORDED
     cloud = settings["cloud"]
-    if cloud["shots"] == "scan_frame" or cloud["scan_positions"]:
+    placed = facts.source.scans and all(s.position_m is not None for s in facts.source.scans)
+    if cloud["shots"] == "scan_frame" or cloud["scan_positions"] or placed:
         return REBUILDABLE
     return UNKNOWN
 
 
-def judge(facts: CloudFacts, settings: dict[str, Any], path: str | Path) -> list[Finding]:
-    """Findings on the shots of a cloud."""
+def judge(
+    facts: CloudFacts, settings: dict[str, Any], path: str | Path, positions: str | Path = ""
+) -> list[Finding]:
+    """Findings on the shots of a cloud; `positions` is the table of scan positions, if any."""
     found = [*needed(facts, settings, path), *one_frame(facts, settings, path)]
     found += blind(facts, path)
-    if misses(facts, settings) == RECORDED and len(facts.source.scans) > 1:
+    state = misses(facts, settings)
+    if state == RECORDED and len(facts.source.scans) > 1:
         found += clipped(facts, path)
+    if state == REBUILDABLE and settings["cloud"]["shots"] != "scan_frame":
+        found += frames_show(facts, settings, path, positions)
     return found
 
 
@@ -79,6 +87,29 @@ def one_frame(facts: CloudFacts, settings: dict, path: str | Path) -> Iterator[F
         "scan.",
         "cloud:\n  shots: positions\n  scan_positions: positions.csv",
     )
+
+
+def frames_show(
+    facts: CloudFacts, settings: dict, path: str | Path, positions: str | Path
+) -> Iterator[Finding]:
+    """The points of every scan show the frame of its directions."""
+    wanted = [name for name in settings["reconstructions"] if name.startswith("voxels_")]
+    level: findings.Level = "error" if wanted else "note"
+    cloud = facts.cloud
+    try:
+        table = shot_sources.places_of(facts.source, positions, cloud.origin_m)
+        if table is None:
+            return
+        number = scan_windows.scan_of_point(cloud, table, path)
+        for row in table.to_dict("records"):
+            place = np.array([row["x_m"], row["y_m"], row["z_m"]], float)
+            xyz = cloud.xyz_m[number == row["position"]] - place
+            if len(xyz) >= scan_windows.LEAST_POINTS:
+                scan_windows.frame_of(
+                    xyz, scan_windows.tilt_of(row), f"{path}, scan {row['position']}"
+                )
+    except InputError as mistake:
+        yield replace(findings.of(mistake), level=level)
 
 
 def blind(facts: CloudFacts, path: str | Path) -> Iterator[Finding]:

@@ -12,7 +12,6 @@ import numpy as np
 from dapple.cloud import lattice
 from dapple.cloud.lattice import ScanFrame
 from dapple.errors import EmptyCloudError, InputError
-from dapple.formats import shots as shots_format
 from dapple.formats.clouds import Cloud
 from dapple.formats.shots import Shots
 
@@ -98,83 +97,6 @@ def shots_from_scan(
         "trunnion_deg": float(np.degrees(lines.coefficients[2])),
     }
     return shots, facts
-
-
-def rebuild_shots(
-    cloud: Cloud,
-    positions_m: np.ndarray,
-    step_deg: float,
-    *,
-    lowest_miss_zenith_deg: float = 100.0,
-    source: str | Path = "cloud",
-) -> tuple[Shots, list[dict]]:
-    """Rebuild the shots of level scanners from their positions and angular step alone.
-
-    Parameters
-    ----------
-    cloud : Cloud
-        With `PointSourceId` = k for the points seen from row k - 1 of `positions_m`.
-    positions_m : (s, 3) array_like
-        Scanners, local frame [m].
-    step_deg : float
-        Angle between neighbouring shots, the same in zenith and azimuth [°].
-
-    Returns
-    -------
-    shots : Shots
-    facts : list of dict
-        One a scan, as from `shots_from_scan`.
-
-    Notes
-    -----
-    The frame is the window that the points span: directions beyond it, such as open sky above
-    every return of the scan, are not known and stay out.
-    """
-    number = cloud.attributes["PointSourceId"]
-    parts, facts = [], []
-    for scan, position in enumerate(np.asarray(positions_m, float), 1):
-        one = cloud.select(number == scan)
-        if not len(one):
-            continue
-        found, fact = shots_from_scan(
-            one,
-            position,
-            _window(one.xyz_m - position, step_deg),
-            scan=scan,
-            lowest_miss_zenith_deg=lowest_miss_zenith_deg,
-            source=f"{source}, scan {scan}",
-        )
-        parts.append(found)
-        facts.append({"scan": scan} | fact)
-    if not parts:
-        raise EmptyCloudError(
-            source,
-            f"no point of scans 1 to {len(positions_m)} (PointSourceId {np.unique(number)[:8]})",
-            "PointSourceId counted from 1 in the order of the positions",
-            "Number the scans alike in the cloud and in the table of positions.",
-        )
-    return shots_format.concatenate(parts), facts
-
-
-def _window(xyz_m: np.ndarray, step_deg: float) -> ScanFrame:
-    """The frame of a level scanner that the points span."""
-    zenith, azimuth, _ = lattice.spherical(xyz_m)
-    low, high = np.degrees([zenith.min(), zenith.max()])
-    turned = np.sort(np.degrees(azimuth) % 360.0)
-    gaps = np.diff(turned, append=turned[0] + 360.0)
-    widest = int(np.argmax(gaps))
-    if gaps[widest] < 10.0:  # a wider gap is the border of the window
-        start, width = 0.0, 360.0 - step_deg
-    else:
-        start, width = turned[(widest + 1) % len(turned)], 360.0 - gaps[widest]
-    n_zenith = round((high - low) / step_deg) + 1
-    n_azimuth = round(width / step_deg) + 1
-    return ScanFrame(
-        n_zenith,
-        n_azimuth,
-        (low, low + (n_zenith - 1) * step_deg),
-        (start, start + (n_azimuth - 1) * step_deg),
-    )
 
 
 def _enough(cloud: Cloud, source: str | Path) -> None:

@@ -60,7 +60,7 @@ def shots_from_file(
                 source=f"{path}, scan {number}",
             )
         except EmptyCloudError as error:
-            yield _nothing(origin_m), {"scan": number, "skipped": error.found}
+            yield Shots.none(origin_m), {"scan": number, "skipped": error.found}
 
 
 def shots_of_grid(
@@ -114,21 +114,6 @@ def shots_of_grid(
         "zenith_residual_deg": rows.residual_deg,
     }
     return shots, facts
-
-
-def _nothing(origin_m: np.ndarray) -> Shots:
-    """No shot at all."""
-    none = np.empty(0, np.float32)
-    return Shots(
-        np.empty((0, 3)),
-        np.empty((0, 3)),
-        np.empty(0, np.uint16),
-        np.zeros(1, np.int64),
-        np.empty(0),
-        none,
-        none,
-        np.asarray(origin_m, float),
-    )
 
 
 def _fitted(

@@ -13,6 +13,7 @@ from dapple.errors import InputError
 from dapple.formats.cloud_raw import (
     AT_SCANNER,
     KNOWN_NAMES,
+    MISSED,
     RawCloud,
     ScanFacts,
     Source,
@@ -36,7 +37,6 @@ NAMES = {
     "timeStamp": "GpsTime",
 }
 CHUNK = 500_000
-NO_RETURN = "shot that met nothing"
 MOST_CELLS = 1000
 """Of the grid of a scan for each of its records: more, and its indices mean something else."""
 
@@ -60,7 +60,7 @@ class Scan:
 
 def read(path: Path) -> RawCloud:
     """Valid points of all scans; `PointSourceId` counts the scans from 1."""
-    pieces, facts, left_out = [], [], {NO_RETURN: 0, AT_SCANNER: 0}
+    pieces, facts, left_out = [], [], {MISSED: 0, AT_SCANNER: 0}
     with _opened(path) as file:
         crs = _coordinate_system(file)
         for number in range(1, file.scan_count + 1):
@@ -70,7 +70,7 @@ def read(path: Path) -> RawCloud:
             ids = {"PointSourceId": np.full(n, number, np.uint16)}
             pieces.append({"xyz": xyz, **ids, **scan.attributes})
             shots = None if scan.shape is None else scan.shape[0] * scan.shape[1]
-            left_out[NO_RETURN] += scan.invalid
+            left_out[MISSED] += scan.invalid
             left_out[AT_SCANNER] += scan.at_scanner
             facts.append(ScanFacts(number, scan.position_m, n, shots))
     attributes = joined(pieces)

@@ -1,6 +1,5 @@
 """Points in PLY files: ASCII and binary, CloudCompare's scalar fields, ray clouds."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -9,30 +8,21 @@ from dapple import frames
 from dapple.errors import InputError
 from dapple.formats import ply_elements
 from dapple.formats.atomic import atomic
-from dapple.formats.cloud_raw import RawCloud, Source, attribute_name, columns, distinct
+from dapple.formats.cloud_raw import (
+    MISSED,
+    Fired,
+    RawCloud,
+    Source,
+    attribute_name,
+    columns,
+    distinct,
+)
 from dapple.formats.ply_elements import damaged
 
 NAMES = {"i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort", "i4": "int", "u4": "uint"}
 ORIGIN = "origin_m"
 RAY_FIELDS = {"time", "nx", "ny", "nz", "alpha"}
 """Of a ray cloud: the vector from a ray's end back to its start, and 0 where nothing was met."""
-
-
-@dataclass(frozen=True)
-class Rays:
-    """Rays of a ray cloud in the file's coordinates.
-
-    Attributes
-    ----------
-    start_m, end_m : (n, 3) float64
-        Where the laser was, and where the ray ended [m].
-    met : (n,) bool
-        False where the ray met nothing: its end is then no surface.
-    """
-
-    start_m: np.ndarray
-    end_m: np.ndarray
-    met: np.ndarray
 
 
 def read(path: Path) -> RawCloud:
@@ -44,7 +34,7 @@ def read(path: Path) -> RawCloud:
     others = [name for name in values if name not in "xyz"]
     if _is_ray_cloud(values):
         met = values["alpha"] > 0
-        left_out["ray that met nothing"] = int((~met).sum())
+        left_out[MISSED] = int((~met).sum())
         others = [name for name in others if name not in RAY_FIELDS - {"time"}]
         values, xyz = {name: values[name][met] for name in others}, xyz[met]
     names = distinct(attribute_name(name) for name in others)
@@ -58,13 +48,22 @@ def read(path: Path) -> RawCloud:
     return RawCloud(local, header.origin, attributes, True, source)
 
 
-def read_rays(path: Path) -> Rays | None:
-    """The rays of a ray cloud; None where the file is none."""
+def read_fired(path: Path) -> Fired | None:
+    """The rays of a ray cloud as shots; None where the file is none. Rays without length go."""
     values, _ = _vertices(path)
     if not _is_ray_cloud(values):
         return None
-    end = _axes(values, "xyz")
-    return Rays(end + _axes(values, ("nx", "ny", "nz")), end, values["alpha"] > 0)
+    back = _axes(values, ("nx", "ny", "nz"))
+    length = np.linalg.norm(back, axis=1)
+    good = length > 0
+    met = (values["alpha"] > 0)[good]
+    start = (_axes(values, "xyz") + back)[good]
+    return Fired(
+        start,
+        -back[good] / length[good, None],
+        np.concatenate([[0], np.cumsum(met)]),
+        length[good][met],
+    )
 
 
 def _is_ray_cloud(values: dict[str, np.ndarray]) -> bool:

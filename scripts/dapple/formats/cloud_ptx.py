@@ -17,7 +17,7 @@ import pandas as pd
 
 from dapple import frames
 from dapple.errors import InputError
-from dapple.formats.cloud_raw import RawCloud, ScanFacts, Source, joined
+from dapple.formats.cloud_raw import MISSED, RawCloud, ScanFacts, Source, joined
 from dapple.formats.ordered_scan import OrderedScan
 
 LINES = 1_000_000
@@ -39,7 +39,7 @@ def read(path: Path) -> RawCloud:
         facts.append(ScanFacts(number, scan.position_m, len(world), int(np.prod(scan.shape))))
     shots = sum(scan.shots or 0 for scan in facts)
     points = sum(scan.points for scan in facts)
-    source = Source(shots, left_out={"shot that met nothing": shots - points}, scans=tuple(facts))
+    source = Source(shots, left_out={MISSED: shots - points}, scans=tuple(facts))
     if origin is None or not pieces:
         return RawCloud(np.empty((0, 3)), source=source)
     attributes = joined(pieces)

@@ -33,6 +33,7 @@ _BY_LETTERS = {name.lower(): name for name in KNOWN_NAMES} | {
     "b": "Blue",
 }
 
+MISSED = "shot that met nothing"
 AT_SCANNER = "at the scanner's own place"
 """Points 0 0 0 in a scanner's own frame: shots that met nothing, written as points."""
 
@@ -116,6 +117,48 @@ class RawCloud:
     attributes: dict[str, np.ndarray] = field(default_factory=dict)
     final: bool = False
     source: Source = Source()
+
+
+@dataclass(frozen=True)
+class Fired:
+    """Shots as a file tells them one by one, in its coordinates; returns as in `shots.Shots`.
+
+    Attributes
+    ----------
+    origin_m, direction : (n, 3) float64
+        Where each shot starts [m], and unit vectors.
+    first : (n + 1,) int64
+        Index of each shot's first return; a miss has none.
+    range_m : (m,) float64
+        Distance of each return, near to far [m].
+    attributes : dict of str to (m,) array
+        Of the returns.
+    """
+
+    origin_m: np.ndarray
+    direction: np.ndarray
+    first: np.ndarray
+    range_m: np.ndarray
+    attributes: dict[str, np.ndarray] = field(default_factory=dict)
+
+    @property
+    def return_xyz_m(self) -> np.ndarray:
+        """(m, 3) place of each return [m]."""
+        shot = np.repeat(np.arange(len(self.direction)), np.diff(self.first))
+        return self.origin_m[shot] + self.direction[shot] * self.range_m[:, None]
+
+    def to_raw(self) -> "RawCloud":
+        """The returns as points; shots without return are counted as left out."""
+        counts = np.diff(self.first)
+        attributes = dict(self.attributes)
+        if counts.max(initial=0) > 1:
+            shot = np.repeat(np.arange(len(counts)), counts)
+            number = np.arange(len(shot)) - self.first[shot] + 1
+            attributes["ReturnNumber"] = number.astype(np.uint8)
+            attributes["NumberOfReturns"] = counts[shot].astype(np.uint8)
+        missed = int((counts == 0).sum())
+        source = Source(len(self.range_m) + missed, left_out={MISSED: missed})
+        return RawCloud(self.return_xyz_m, attributes=attributes, source=source)
 
 
 def attribute_name(name: str) -> str:

@@ -8,9 +8,17 @@ import numpy as np
 import pandas as pd
 
 from dapple import frames
-from dapple.formats import text_layout
+from dapple.formats import shot_tables, text_layout
 from dapple.formats.atomic import atomic
-from dapple.formats.cloud_raw import RawCloud, ScanFacts, Source, Units, attribute_name, distinct
+from dapple.formats.cloud_raw import (
+    Fired,
+    RawCloud,
+    ScanFacts,
+    Source,
+    Units,
+    attribute_name,
+    distinct,
+)
 from dapple.formats.text_layout import Layout
 
 PTS_COLUMNS = ("X", "Y", "Z", "Intensity", "Red", "Green", "Blue")
@@ -22,6 +30,8 @@ def read(path: Path) -> RawCloud:
     A line that holds one number alone is the number of points that follow, as in PTS files: where
     there are several, each begins a scan, and `PointSourceId` counts them from 1.
     """
+    if (fired := read_fired(path)) is not None:
+        return fired.to_raw()
     layout = text_layout.find(path)
     if layout is None:
         return RawCloud(np.empty((0, 3)))
@@ -56,6 +66,13 @@ def read(path: Path) -> RawCloud:
     units = Units(degrees=degrees)
     source = Source(len(xyz), units=units, notes=tuple(notes), scans=scans)
     return RawCloud(xyz, attributes=attributes, source=source)
+
+
+def read_fired(path: Path) -> Fired | None:
+    """The shots of a table of AMAPVox or HELIOS++; None where the file is another table."""
+    if shot_tables.pulses_of(path) is not None:
+        return shot_tables.read_helios(path)
+    return shot_tables.read_amapvox(path) if shot_tables.is_amapvox(path) else None
 
 
 def read_table(path: Path, layout: Layout) -> pd.DataFrame:

@@ -9,7 +9,7 @@ import numpy as np
 from dapple import frames
 from dapple.errors import EmptyCloudError, InputError
 from dapple.formats import cloud_e57, cloud_las, cloud_ply, cloud_ptx, cloud_text
-from dapple.formats.cloud_raw import RawCloud, Source
+from dapple.formats.cloud_raw import Fired, RawCloud, Source
 from dapple.formats.ordered_scan import OrderedScan
 
 LEAF, WOOD = 4, 0
@@ -21,6 +21,10 @@ READERS = {
     ".e57": cloud_e57.read,
     ".ptx": cloud_ptx.read,
     **dict.fromkeys((".txt", ".xyz", ".csv", ".asc", ".pts"), cloud_text.read),
+}
+FIRED = {
+    ".ply": cloud_ply.read_fired,
+    **dict.fromkeys((".txt", ".xyz", ".csv"), cloud_text.read_fired),
 }
 ORDERED = {".ptx": cloud_ptx.scans, ".e57": cloud_e57.scans}
 WRITERS = {
@@ -165,6 +169,14 @@ def ordered_scans(path: str | Path) -> Iterator[tuple[int, OrderedScan]]:
     reader = _by_suffix(path, ORDERED, "read as ordered scans")
     _exists(path)
     yield from reader(path)
+
+
+def fired(path: str | Path) -> Fired | None:
+    """The shots that a ray cloud or a table of shots tells one by one; None for other files."""
+    path = Path(path)
+    _exists(path)
+    reader = FIRED.get(path.suffix.lower())
+    return None if reader is None else reader(path)
 
 
 def _by_suffix(path: Path, table: dict, action: str):

@@ -15,6 +15,7 @@ from dapple.formats.atomic import atomic
 from dapple.formats.clouds import Cloud
 
 SHOT_COLUMNS = ("scan", "dx", "dy", "dz")
+OFFSET_COLUMNS = ("ox", "oy", "oz")
 RETURN_COLUMNS = ("range_m", "reflectance_db", "deviation")
 METADATA_KEY = "dapple"
 ROW_GROUP_SHOTS = 1 << 16
@@ -56,6 +57,21 @@ class Shots:
 
     def __len__(self) -> int:
         return len(self.direction)
+
+    @classmethod
+    def none(cls, world_origin_m: np.ndarray) -> "Shots":
+        """No shot at all, in a local frame."""
+        nothing = np.empty(0, np.float32)
+        return cls(
+            np.empty((0, 3)),
+            np.empty((0, 3)),
+            np.empty(0, np.uint16),
+            np.zeros(1, np.int64),
+            np.empty(0),
+            nothing,
+            nothing,
+            np.asarray(world_origin_m, float),
+        )
 
     @property
     def n_returns(self) -> np.ndarray:
@@ -151,13 +167,18 @@ def part(shots: Shots, start: int, stop: int) -> Shots:
     )
 
 
-def write_chunks(path: str | Path, chunks: Iterable[Shots], facts: dict | None = None) -> int:
+def write_chunks(
+    path: str | Path, chunks: Iterable[Shots], facts: dict | None = None, *, moving: bool = False
+) -> int:
     """Write shots chunk by chunk, one row group each, so that memory holds one chunk.
 
     One row a shot, misses included: `scan`, `dx`, `dy`, `dz` and the lists `range_m`,
     `reflectance_db`, `deviation` and, where known, `truth`. Directions and ranges are float32:
     at 15 m that is 1 µm, at 250 m 15 µm. Scan positions and the world origin are float64 in
     the file's metadata (key `dapple`, JSON), with `facts`.
+
+    Of a scanner that moves, each shot's place relative to its scan's position is written too:
+    `ox`, `oy`, `oz`.
 
     Parameters
     ----------
@@ -167,6 +188,8 @@ def write_chunks(path: str | Path, chunks: Iterable[Shots], facts: dict | None =
         Taken one at a time.
     facts : dict, optional
         What a reader may want to know, such as the scanner's settings; read after the last chunk.
+    moving : bool
+        Shots of one scan start from different places.
 
     Returns
     -------
@@ -183,7 +206,8 @@ def write_chunks(path: str | Path, chunks: Iterable[Shots], facts: dict | None =
     with atomic(path) as partial:
         try:
             for chunk in chunks:
-                table = _table(chunk)
+                _note_positions(path, positions, chunk, moving)
+                table = _table(chunk, positions if moving else None)
                 if writer is None:
                     origin = np.asarray(chunk.world_origin_m, np.float64).tolist()
                     writer = parquet.ParquetWriter(
@@ -193,7 +217,6 @@ def write_chunks(path: str | Path, chunks: Iterable[Shots], facts: dict | None =
                         use_dictionary=["scan", "truth.list.element"],
                         use_byte_stream_split=["dx", "dy", "dz", "range_m.list.element"],
                     )
-                _note_positions(path, positions, chunk)
                 writer.write_table(table, row_group_size=max(1, len(chunk)))
                 n_shots += len(chunk)
             if writer is None:
@@ -273,12 +296,16 @@ def _head(path: str | Path, file: parquet.ParquetFile) -> dict:
     return head
 
 
-def _note_positions(path: str | Path, positions: dict[int, list[float]], chunk: Shots) -> None:
-    """Remember where each scan stands; a scan that moves cannot be written."""
+def _note_positions(
+    path: str | Path, positions: dict[int, list[float]], chunk: Shots, moving: bool
+) -> None:
+    """Remember where each scan stands, or begins where it moves."""
     scans, at, which = np.unique(chunk.scan, return_index=True, return_inverse=True)
     places = chunk.origin_m[at]
     for scan, place in zip(scans.tolist(), places.tolist(), strict=True):
         known = positions.setdefault(scan, place)
+        if moving:
+            continue
         if known != place or not np.array_equal(chunk.origin_m, places[which]):
             raise InputError(
                 path,
@@ -288,12 +315,16 @@ def _note_positions(path: str | Path, positions: dict[int, list[float]], chunk: 
             )
 
 
-def _table(shots: Shots) -> pa.Table:
-    """Shots as an Arrow table, one row each."""
+def _table(shots: Shots, positions: dict[int, list[float]] | None = None) -> pa.Table:
+    """Shots as an Arrow table, one row each; with positions, of scanners that move."""
     first = pa.array(shots.first.astype(np.int32))
     columns = {"scan": pa.array(shots.scan.astype(np.uint16))}
     for k, name in enumerate(("dx", "dy", "dz")):
         columns[name] = pa.array(shots.direction[:, k].astype(np.float32))
+    if positions is not None:
+        places = np.array([positions[scan] for scan in shots.scan.tolist()]).reshape(-1, 3)
+        for k, name in enumerate(OFFSET_COLUMNS):
+            columns[name] = pa.array((shots.origin_m[:, k] - places[:, k]).astype(np.float32))
     lists = {name: getattr(shots, name).astype(np.float32) for name in RETURN_COLUMNS}
     if shots.truth is not None:
         lists["truth"] = shots.truth.astype(np.uint8)
@@ -314,8 +345,11 @@ def _shots(batch: pa.RecordBatch, head: dict) -> Shots:
         return values.to_numpy(zero_copy_only=False).astype(dtype)
 
     n_returns = batch.column("range_m").value_lengths().to_numpy()
+    origin = places.reshape(-1, 3)[np.searchsorted(numbers, scan)]
+    if OFFSET_COLUMNS[0] in batch.schema.names:
+        origin = origin + np.stack([column(n, np.float64) for n in OFFSET_COLUMNS], axis=1)
     return Shots(
-        places.reshape(-1, 3)[np.searchsorted(numbers, scan)],
+        origin,
         np.stack([column(name, np.float64) for name in ("dx", "dy", "dz")], axis=1),
         scan.astype(np.uint16),
         _first(n_returns),
