@@ -8,7 +8,7 @@ run: setup
 	$(BIN)/snakemake --cores $(CORES)
 
 test: setup lint
-	$(BIN)/python -m pytest -q -n $(CORES) --dist loadgroup
+	$(BIN)/python -m pytest -q -n $(CORES) --dist loadfile
 
 setup:
 	@tools/setup

@@ -1,25 +1,24 @@
 """What tests of the whole workflow share."""
 
-from pathlib import Path
+import fcntl
 
 import pytest
-from tests.workflow.project import copy_of_project
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
-    """Tests that share a run stay in one process, where tests are spread over several."""
-    for item in items:
-        if item.path.is_relative_to(Path(__file__).parent):
-            shares = "small_run" if "small_run" in item.fixturenames else item.path.stem
-            item.add_marker(pytest.mark.xdist_group(shares))
+from tests.workflow.project import Project, copy_of_project
 
 
 @pytest.fixture(scope="session")
-def small_run(tmp_path_factory):
+def small_run(tmp_path_factory, worker_id):
     """The whole chain in a small virtual world, run once for all tests; not to be edited."""
-    project = copy_of_project(tmp_path_factory.mktemp("small") / "dapple")
-    project.run()
+    shared = tmp_path_factory.getbasetemp()
+    if worker_id != "master":  # tests are spread over processes: one runs it, others wait
+        shared = shared.parent
+    with (shared / "small.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if (shared / "small.done").exists():
+            return Project(shared / "small/dapple")
+        project = copy_of_project(shared / "small/dapple")
+        project.run()
+        (shared / "small.done").touch()
     return project
 
 
