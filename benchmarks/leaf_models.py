@@ -8,6 +8,7 @@ A fourth set has the soils of GSV, where their vectors are in the run's `data_di
 
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -16,7 +17,7 @@ import yaml
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
 from dapple.config.settings import Settings
-from dapple.formats import geojson, json, rasters
+from dapple.formats import json, rasters, vectors
 from dapple.optics.cameras import ZHAO
 from dapple.retrieval import evaluation, network, spectra, training_entries
 from dapple.retrieval.noise import Noise
@@ -40,15 +41,15 @@ def scores(folder: Path, name: str) -> pd.DataFrame:
     retrieval = settings.chlorophyll.retrieval
     path = folder / "plots" / name
     rows = []
-    for surfaces, (version, anthocyanin, vectors) in SURFACES.items():
-        vectors = vectors and Path(settings.data_dir) / vectors
-        if vectors and not vectors.is_dir():
-            print(f"no {vectors}: without GSV")
+    for surfaces, (version, anthocyanin, soils) in SURFACES.items():
+        soils = soils and Path(settings.data_dir) / soils
+        if soils and not soils.is_dir():
+            print(f"no {soils}: without GSV")
             continue
         changed = {
             "prospect_version": version,
             "anthocyanin_per_chlorophyll": anthocyanin,
-            "soil_vectors": str(vectors),
+            "soil_vectors": str(soils),
         }
         for model in MODELS:
             frame = entries(settings.chlorophyll, path, name, changed, model)
@@ -83,20 +84,21 @@ def entries(settings, path: Path, name: str, changed: dict, model: str) -> pd.Da
     params = {
         "model": model,
         "selection": {"cell_m": retrieval.map_pixel_m, "min_share": retrieval.min_share},
-        "light": plot.model_dump()
-        | {
-            "bark": ZHAO.at_centres(settings.images.bark_reflectance),
-            "diffuse_share": ZHAO.at_centres(plot.diffuse_share),
-        },
         "sail": {"leaf_angle_deg": retrieval.leaf_angle_deg, "hot_spot": retrieval.hot_spot},
     }
     canopy = rasters.read(path / "retrieval/canopy.tif")
-    files = [path / file for file in MODELS[model]]
+    inputs = SimpleNamespace(
+        simulation=[path / file for file in MODELS[model]],
+        sun=path / "light/sun.json",
+        sky=path / "light/sky.json",
+    )
     if model == "prosail":
         origin_m = json.read(path / "scene/summary.json")["world_origin_m"]
-        chunks, mask, pixel_m = level_canopies(files, canopy, properties, origin_m, params)
+        chunks, mask, pixel_m = level_canopies(inputs, canopy, properties, origin_m, params)
     else:
-        chunks, _ = images(files[0], properties, params)
+        share = np.asarray(json.read(inputs.sky)["diffuse_share"])
+        bark = ZHAO.at_centres(settings.images.bark_reflectance)
+        chunks, _ = images(inputs.simulation[0], properties, model, bark, share)
         mask, pixel_m = canopy.values[0] > 0, canopy.pixel_m
     over = training_entries.cells(mask.shape, pixel_m=pixel_m, cell_m=retrieval.map_pixel_m)
     found = training_entries.aggregate(
@@ -136,7 +138,7 @@ def test(net: network.Network, frame: pd.DataFrame) -> dict[str, float]:
 def field(net: network.Network, path: Path, cell_m: float) -> dict[str, float]:
     """Score on the trees of the observed images."""
     observed = rasters.read(path / "retrieval/observed_sunlit.tif")
-    crowns = geojson.read(path / "world/crowns.geojson")
+    crowns = vectors.read(path / "world/crowns.geojson")
     bands = rasters.select(observed, ZHAO.names, path).values
     flat = bands.reshape(len(bands), -1).T
     lcc = np.where(np.isfinite(flat).all(axis=1), network.predict(net, flat), np.nan)

@@ -50,10 +50,10 @@ rule records:
         "../scripts/records.py"
 
 
-rule statistics:
+rule record_statistics:
     input:
         records=results("statistics/records.csv"),
-        code=code("statistics"),
+        code=code("record_statistics"),
     output:
         overall=report(
             results("statistics/overall.csv"),
@@ -63,9 +63,9 @@ rule statistics:
         per_sensor=results("statistics/per_sensor.csv"),
         mixed_model=results("statistics/mixed_model.csv"),
     log:
-        logs("statistics"),
+        logs("record_statistics"),
     benchmark:
-        benchmarks("statistics")
+        benchmarks("record_statistics")
     conda:
         "../envs/statistics.yaml"
     threads: 1
@@ -77,7 +77,7 @@ rule statistics:
     message:
         said("correlation, error, bias")
     script:
-        "../scripts/statistics.py"
+        "../scripts/record_statistics.py"
 
 
 rule agreement:

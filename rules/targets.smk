@@ -5,6 +5,8 @@ Needs   the configuration
 Makes   nothing
 """
 
+PLOT_FIGURES = ("map", "field", "spectra", "simulated", "losses")
+
 
 def light_targets():
     """Geometry, light, their comparison with records and with the per-timestep engine, a report."""
@@ -43,8 +45,9 @@ def chlorophyll_targets():
         *(
             f"chlorophyll/{plot}_{figure}.png"
             for plot in settings.chlorophyll.plots
-            for figure in ("map", "field", "simulated", "spectra", "losses")
+            for figure in PLOT_FIGURES
         ),
+        *(f"chlorophyll/{plot}_report.html" for plot in settings.chlorophyll.plots),
     ]
 
 

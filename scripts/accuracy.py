@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from dapple.formats import geojson, json, rasters, tables
+from dapple.formats import json, rasters, tables, vectors
 from dapple.retrieval import evaluation, intervals, maps, network, training_entries
 from dapple.retrieval.noise import Noise
 from dapple.workflow import run
@@ -19,14 +19,14 @@ def main(snakemake):
         inputs.maps, inputs.intervals, strict=True,
     )  # fmt: skip
     for taught, table_path, network_paths, map_path, interval_path in files:
-        interval = json.read(interval_path)["interval"]
-        interval = intervals.Interval(
-            np.array(interval["edges"]), np.array(interval["width"]),
-            interval["factor"], interval["level"],
-        )  # fmt: skip
+        saved = json.read(interval_path)["interval"]
+        bins = {name: np.array(saved[name]) for name in ("edges", "width")}
+        interval = intervals.Interval(**saved | bins)
         networks = [network.read(path) for path in network_paths]
         rows, some = simulated(tables.read(table_path), networks, interval, params)
-        field_rows, table = field(map_path, inputs.crowns, params.seeds)
+        field_rows, table = [], evaluation.no_trees()
+        if inputs.crowns:
+            field_rows, table = field(map_path, inputs.crowns, params.seeds)
         scores += [{"plot": params.plot} | taught | row for row in [*rows, *field_rows]]
         trees.append(table.assign(plot=params.plot, **taught))
         shown.append(some.assign(**taught))
@@ -69,9 +69,9 @@ def simulated(frame, networks, interval, params):
 
 
 def field(map_path, crowns_path, seeds):
-    """Scores on trees, and the trees."""
-    found, crowns = rasters.read(map_path), geojson.read(crowns_path)
-    geojson.require_crs(crowns, found.crs, crowns_path)
+    """Scores on trees, where any has known chlorophyll, and all trees."""
+    found, crowns = rasters.read(map_path), vectors.read(crowns_path)
+    vectors.require_crs(crowns, found.crs, crowns_path)
     table = evaluation.trees(
         found.values, crowns.geometries, crowns.names, crowns.lcc_ug_cm2,
         left_m=found.left_m, top_m=found.top_m, cell_m=found.pixel_m, where=crowns_path,
@@ -81,7 +81,8 @@ def field(map_path, crowns_path, seeds):
     table = table.rename(columns=names)
     missing = table["covered_share"] == 0
     print(f"{missing.sum()} of {len(table)} crowns have no pixel: {list(table['tree'][missing])}")
-    truth = table["truth_ug_cm2"].to_numpy()
+    if not np.isfinite(truth := table["truth_ug_cm2"].to_numpy()).any():
+        return [], table
     each = {seed: table[f"seed_{seed}_ug_cm2"].to_numpy() for seed in seeds}
     rows = evaluation.over_seeds(truth, each)
     rows[-1] |= {
@@ -90,8 +91,8 @@ def field(map_path, crowns_path, seeds):
         ),
         "outside_share": float(table["outside_share"].mean()),
     }
-    rows = [{"test_set": "field", "n_without_pixels": int(missing.sum())} | row for row in rows]
-    return rows, table
+    of_field = {"test_set": "field", "n_without_pixels": int(missing.sum())}
+    return [of_field | row for row in rows], table
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from dapple.figures import chlorophyll_maps, style
-from dapple.formats import geojson, rasters, tables
+from dapple.formats import rasters, tables, vectors
 from dapple.optics.cameras import camera
 from dapple.workflow import run
 
@@ -33,8 +33,9 @@ def main(snakemake):
     ]
     style.save(chlorophyll_maps.losses(pd.concat(histories)), output.losses)
     images, found = rasters.read(inputs.canopy), rasters.read(inputs.map)
-    crowns = geojson.read(inputs.crowns)
-    rings, truth = outlines(crowns, np.array([found.left_m, found.top_m]))
+    rings, truth = [], []
+    if inputs.crowns:
+        rings, truth = outlines(vectors.read(inputs.crowns), np.array([found.left_m, found.top_m]))
     figure = chlorophyll_maps.chlorophyll_map(
         found.values[:5],
         cell_m=found.pixel_m,

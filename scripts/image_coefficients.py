@@ -18,6 +18,7 @@ def main(snakemake):
     params, inputs = options(snakemake.params), snakemake.input
     observed = rasters.read(inputs.images)
     origin_m = json.read(inputs.summary)["world_origin_m"]
+    sun = json.read(inputs.sun)
     rows, columns = maps.shape_of(observed, params["pixel_m"])
     window = Window(
         observed.left_m - origin_m[0],
@@ -32,7 +33,7 @@ def main(snakemake):
     coefficients = image_paths.trace(
         traced.load(scene, params["variant"]),
         window,
-        direction_from_angles(params["sun"]["zenith_deg"], params["sun"]["azimuth_deg"]),
+        direction_from_angles(sun["sun_zenith_deg"], sun["sun_azimuth_deg"]),
         n_paths=n_paths,
         n_columns=params["columns"],
         max_orders=params["max_orders"],

@@ -17,7 +17,7 @@ def main(snakemake):
     params, inputs, output = snakemake.params, snakemake.input, snakemake.output
     scene = scene_files.read_plot(inputs.leaves, inputs.wood, inputs.terrain)
     traced, fitted = files.read(inputs.coefficients), files.read_semiless(inputs.semiless)
-    share = np.asarray(params.diffuse_share)
+    share, sun = np.asarray(json.read(inputs.sky)["diffuse_share"]), json.read(inputs.sun)
     seen_by = camera(params.bands, *inputs.responses)
     drawn, properties = spectra.combinations(
         params.leaves_and_soils, params.direct_renders, seen_by, seed=params.seed
@@ -26,7 +26,7 @@ def main(snakemake):
         Renderer(scene, variant=params.variant),
         traced,
         properties,
-        towards_sun=direction_from_angles(params.sun["zenith_deg"], params.sun["azimuth_deg"]),
+        towards_sun=direction_from_angles(sun["sun_zenith_deg"], sun["sun_azimuth_deg"]),
         bark=params.bark,
         diffuse_share=share,
         n_paths=params.direct_paths,

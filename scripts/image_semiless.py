@@ -16,7 +16,7 @@ def main(snakemake):
     started = time.perf_counter()
     fitted = semiless.fit(
         coefficients,
-        params["diffuse_share"],
+        json.read(snakemake.input.sky)["diffuse_share"],
         n_levels=params["levels"],
         structure=params["structure"],
         degree=params["degree"],

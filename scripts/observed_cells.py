@@ -13,7 +13,6 @@ def main(snakemake):
     params, path = snakemake.params, snakemake.input.images
     seen_by = camera(params.bands)
     observed = rasters.select(rasters.read(path), seen_by.names, path)
-    rasters.require_reflectance(observed, path)
     heights = rasters.read(snakemake.input.heights)
     rasters.require_overlap(
         heights,

@@ -16,12 +16,6 @@ def main(snakemake):
     n_points = len(cloud)
     cloud = ground.without_noise(cloud, path, **settings["noise"])
     world = cloud.world_xyz_m
-    if snakemake.input.images:
-        images = rasters.read(snakemake.input.images)
-        low_m, high_m = world.min(axis=0), world.max(axis=0)
-        rasters.require_overlap(
-            images, low_m, high_m, crs, where=snakemake.input.images, other=path
-        )
     dem, chosen = ground.model(world, crs=crs, where=path, **settings["ground"])
     height = ground.heights(world, dem)
     spacing_m = ground.spacing_m(world)

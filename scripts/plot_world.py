@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dapple.formats import geojson, json, meshes, tables
+from dapple.formats import json, meshes, tables, vectors
 from dapple.streams import stream_seed
 from dapple.virtual import crown_outlines, plot_trees, plots, terrain
 from dapple.workflow import options, run
@@ -57,13 +57,13 @@ def write(trees, rings, settings, output):
     world[["x_m", "y_m", "z_m"]] += settings["origin_m"]
     tables.write(output.trees, world, "%.10g")
     chosen = np.flatnonzero(trees.sampled)
-    crowns = geojson.of_rings(
+    crowns = vectors.of_rings(
         [rings[k] + np.asarray(settings["origin_m"][:2]) for k in chosen],
         trees.tree.to_numpy()[chosen],
         trees.lcc_ug_cm2.to_numpy()[chosen],
         settings["crs"],
     )
-    geojson.write(output.crowns, crowns)
+    vectors.write(output.crowns, crowns)
 
 
 if __name__ == "__main__":

@@ -23,11 +23,12 @@ def main(snakemake):
     origin_m = json.read(snakemake.input.summary)["world_origin_m"]
     if params["model"] == "prosail":
         chunks, mask, pixel_m = level_canopies(
-            snakemake.input.simulation, canopy, properties, origin_m, params
+            snakemake.input, canopy, properties, origin_m, params
         )
     else:
         (path,) = snakemake.input.simulation
-        chunks, window = images(path, properties, params)
+        share = np.asarray(json.read(snakemake.input.sky)["diffuse_share"])
+        chunks, window = images(path, properties, params["model"], params["bark"], share)
         check_window(window, canopy, origin_m, path)
         mask, pixel_m = canopy.values[0] > 0, canopy.pixel_m
     selection = params["selection"]
@@ -48,25 +49,23 @@ def main(snakemake):
     print(f"{time.perf_counter() - start:.1f} s")
 
 
-def images(path, properties, params):
+def images(path, properties, model, bark, share):
     """Chunks of pixels of images by three-dimensional transport, and their grid."""
-    light = params["light"]
     leaf = (properties.leaf_reflectance, properties.leaf_transmittance)
-    share = np.asarray(light["diffuse_share"])
-    if params["model"] == "semi_less":
+    if model == "semi_less":
         fitted = coefficient_files.read_semiless(path)
         return semiless.image_chunks(fitted, *leaf, properties.soil_reflectance), fitted.window
     traced = coefficient_files.read(path)
-    bark = np.atleast_2d(light["bark"])
-    chunks = coefficients.image_chunks(traced, *leaf, bark, properties.soil_reflectance, share)
+    soil = properties.soil_reflectance
+    chunks = coefficients.image_chunks(traced, *leaf, np.atleast_2d(bark), soil, share)
     return chunks, traced.window
 
 
-def level_canopies(paths, canopy, properties, origin_m, params):
+def level_canopies(inputs, canopy, properties, origin_m, params):
     """SAIL of every cell with plants and canopy pixels, as pixels as large as cells."""
     cell_m = params["selection"]["cell_m"]
     over = training_entries.cells(canopy.values.shape[1:], pixel_m=canopy.pixel_m, cell_m=cell_m)
-    plants = meshes.concatenate([meshes.read_ply(path) for path in paths])
+    plants = meshes.concatenate([meshes.read_ply(path) for path in inputs.simulation])
     index = prosail.plant_area_index(
         plants, left_m=canopy.left_m - origin_m[0], top_m=canopy.top_m - origin_m[1],
         cell_m=cell_m, shape=over.shape,
@@ -75,10 +74,9 @@ def level_canopies(paths, canopy, properties, origin_m, params):
     enough = number >= params["selection"]["min_share"] * over.pixels_per_cell
     mask = enough.reshape(index.shape) & (index > 0)
     print(f"plant area index of {mask.sum()} cells: mean {index[mask].mean():.2f}")
-    light = params["light"]
     values = prosail.images(
-        index, properties, sun_zenith_deg=light["sun_zenith_deg"],
-        diffuse_share=np.asarray(light["diffuse_share"]), **params["sail"],
+        index, properties, sun_zenith_deg=json.read(inputs.sun)["sun_zenith_deg"],
+        diffuse_share=np.asarray(json.read(inputs.sky)["diffuse_share"]), **params["sail"],
     )  # fmt: skip
     return [(slice(0, len(values)), values)], mask, cell_m
 

@@ -35,11 +35,13 @@ def main(snakemake):
     del world
     built = time.perf_counter()
     view = camera.View.over(settings["size_m"], settings["pixel_m"])
-    paths = settings["light"].pop("paths_per_pixel")
+    paths, sun = settings["paths_per_pixel"], json.read(inputs.sun)
     image = camera.photograph(
         scene,
         view,
-        **settings["light"],
+        sun_zenith_deg=sun["sun_zenith_deg"],
+        sun_azimuth_deg=sun["sun_azimuth_deg"],
+        diffuse_share=json.read(inputs.sky)["diffuse_share"],
         paths_per_pixel=[paths[seen_by.is_infrared(k)] for k in range(0, len(seen_by), 3)],
         seed=stream_seed(seed, "paths"),
     )

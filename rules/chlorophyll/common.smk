@@ -10,7 +10,7 @@ from itertools import product
 from dapple.optics.cameras import camera
 
 CHLOROPHYLL = settings.chlorophyll
-BANDS = CHLOROPHYLL.bands
+BANDS = CHLOROPHYLL.camera_bands
 CAMERA = camera(BANDS)
 RESPONSES = [data(CHLOROPHYLL.responses)] if CHLOROPHYLL.responses else []
 CROWNS = CHLOROPHYLL.crowns
@@ -35,19 +35,45 @@ def plot_file(path):
     return results(f"plots/{{plot}}/{path}")
 
 
-def plot_input(kind, made):
-    """A plot's `lidar`, `images` or `crowns`: the user's file, or that of the virtual plot."""
-
-    def choose(wildcards):
-        path = getattr(plot_of(wildcards), kind)
-        return data(path) if path else plot_file(made).format(plot=wildcards.plot)
-
-    return choose
+def own(kind):
+    """The user's `lidar`, `images` or `crowns`, or nothing."""
+    path = getattr(CHLOROPHYLL.user, kind)
+    return data(path) if path else []
 
 
-plot_lidar = plot_input("lidar", "world/lidar.laz")
-plot_images = plot_input("images", "world/images.tif")
-plot_crowns = plot_input("crowns", "world/crowns.geojson")
+def plot_lidar(wildcards):
+    """LiDAR of a plot."""
+    return (
+        own("lidar")
+        if wildcards.plot == "user"
+        else results(f"plots/{wildcards.plot}/world/lidar.laz")
+    )
+
+
+def plot_images(wildcards):
+    """Images of a plot: reflectance in the camera's bands, in the cloud's coordinate system."""
+    folder = "input" if wildcards.plot == "user" else "world"
+    return results(f"plots/{wildcards.plot}/{folder}/images.tif")
+
+
+def plot_crowns(wildcards):
+    """Crowns of a plot in the cloud's coordinate system; a user may have none."""
+    if wildcards.plot == "user":
+        has_crowns = bool(CHLOROPHYLL.user.crowns)
+        return results("plots/user/input/crowns.geojson") if has_crowns else []
+    return results(f"plots/{wildcards.plot}/world/crowns.geojson")
+
+
+def plot_input_facts(wildcards):
+    """What was found in a user's files."""
+    if wildcards.plot != "user":
+        return []
+    crowns = ["crowns"] if CHLOROPHYLL.user.crowns else []
+    return [results(f"plots/user/input/{name}.json") for name in ["images", *crowns]]
+
+
+SUN = plot_file("light/sun.json")
+SKYLIGHT = plot_file("light/sky.json")
 
 WORLD = CHLOROPHYLL.world
 SIZES = {"height_m", "height_sd_m", "crown_radius_m", "crown_radius_sd_m"}
@@ -91,14 +117,9 @@ def plot_tree(wildcards):
 
 
 def plot_light(wildcards):
-    """Sun and sky of the observed images, and how finely they are traced."""
-    plot = plot_of(wildcards)
-    return {
-        "sun_zenith_deg": plot.sun_zenith_deg,
-        "sun_azimuth_deg": plot.sun_azimuth_deg,
-        "diffuse_share": CAMERA.at_centres(plot.diffuse_share),
-        "paths_per_pixel": WORLD.paths_per_pixel,
-    }
+    """What is stated of the sun and sky of a plot's images."""
+    stated = {"sun_zenith_deg", "sun_azimuth_deg", "diffuse_share", "time", "timezone"}
+    return plot_of(wildcards).model_dump(include=stated)
 
 
 def plot_planting(wildcards):
@@ -110,12 +131,6 @@ def plot_planting(wildcards):
         "cover_share": plot.cover,
         "core_share": WORLD.core_share,
     }
-
-
-def plot_own_images(wildcards):
-    """The user's images, to compare coordinate systems; those of a virtual plot fit by birth."""
-    path = plot_of(wildcards).images
-    return [data(path)] if path else []
 
 
 RANGES = (
@@ -246,23 +261,5 @@ def simulation(wildcards):
     return {"simulation": paths}
 
 
-def simulated_light(wildcards):
-    """Sun, sky and bark of the simulated images."""
-    plot = plot_of(wildcards)
-    return {
-        "sun_zenith_deg": plot.sun_zenith_deg,
-        "diffuse_share": CAMERA.at_centres(plot.diffuse_share),
-        "bark": CAMERA.at_centres(CHLOROPHYLL.images.bark_reflectance),
-    }
-
-
 IMAGES = CHLOROPHYLL.images
-
-
-def plot_sun(wildcards):
-    """Where the sun stands over a plot."""
-    plot = plot_of(wildcards)
-    return {
-        "zenith_deg": plot.sun_zenith_deg,
-        "azimuth_deg": plot.sun_azimuth_deg,
-    }
+BARK = CAMERA.at_centres(IMAGES.bark_reflectance)

@@ -17,7 +17,6 @@ Makes   plots/{plot}/scene/dem.tif         elevation of the ground
 rule plot_ground:
     input:
         lidar=plot_lidar,
-        images=plot_own_images,
         code=code("plot_ground"),
     output:
         dem=plot_file("scene/dem.tif"),

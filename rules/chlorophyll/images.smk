@@ -19,6 +19,7 @@ rule image_coefficients:
         terrain=plot_file("scene/terrain.ply"),
         summary=plot_file("scene/summary.json"),
         images=plot_images,
+        sun=SUN,
         code=code("image_coefficients"),
     output:
         coefficients=plot_file("images/coefficients.nc"),
@@ -39,7 +40,6 @@ rule image_coefficients:
         columns=IMAGES.columns,
         max_orders=IMAGES.max_orders,
         cell_m=RETRIEVAL.map_pixel_m,
-        sun=plot_sun,
         variant=f"{VARIANT}_rgb",
         seed=lambda wildcards: stream("image_coefficients", wildcards.plot),
     message:
@@ -51,6 +51,7 @@ rule image_coefficients:
 rule image_semiless:
     input:
         coefficients=plot_file("images/coefficients.nc"),
+        sky=SKYLIGHT,
         code=code("image_semiless"),
     output:
         semiless=plot_file("images/semiless.nc"),
@@ -65,13 +66,10 @@ rule image_semiless:
     resources:
         mem_mb=2000,
     params:
-        diffuse_share=lambda wildcards: CAMERA.at_centres(
-            plot_of(wildcards).diffuse_share
-        ),
         levels=IMAGES.absorption_levels,
         structure=IMAGES.leaf_structure,
         degree=IMAGES.degree,
-        bark=CAMERA.at_centres(IMAGES.bark_reflectance),
+        bark=BARK,
         soils=IMAGES.reference_soils,
     message:
         said("fit Semi-LESS to the images of {wildcards.plot}")
@@ -88,6 +86,8 @@ rule image_comparison:
         semiless=plot_file("images/semiless.nc"),
         tracing=plot_file("images/tracing.json"),
         fitting=plot_file("images/fitting.json"),
+        sun=SUN,
+        sky=SKYLIGHT,
         responses=RESPONSES,
         code=code("image_comparison"),
     output:
@@ -106,11 +106,7 @@ rule image_comparison:
     params:
         bands=BANDS,
         leaves_and_soils=leaves_and_soils,
-        sun=plot_sun,
-        diffuse_share=lambda wildcards: CAMERA.at_centres(
-            plot_of(wildcards).diffuse_share
-        ),
-        bark=CAMERA.at_centres(IMAGES.bark_reflectance),
+        bark=BARK,
         direct_renders=IMAGES.direct_renders,
         direct_paths=IMAGES.direct_paths,
         speed_combinations=IMAGES.speed_combinations,

@@ -89,6 +89,8 @@ rule uav_images:
         terrain=plot_file("world/terrain.ply"),
         leaves=grown_files("leaves"),
         wood=grown_files("wood"),
+        sun=SUN,
+        sky=SKYLIGHT,
         responses=RESPONSES,
         code=code("uav_images"),
     output:
@@ -107,7 +109,7 @@ rule uav_images:
         size_m=lambda wildcards: plot_of(wildcards).size_m,
         pixel_m=lambda wildcards: plot_of(wildcards).pixel_m,
         bands=BANDS,
-        light=plot_light,
+        paths_per_pixel=WORLD.paths_per_pixel,
         noise={"relative": WORLD.relative_noise, "absolute": WORLD.absolute_noise},
         ground=WORLD_GROUND,
         lowest_to_highest_lcc=WORLD.lowest_to_highest_lcc,

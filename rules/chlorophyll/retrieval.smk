@@ -12,7 +12,7 @@ Makes   plots/{plot}/retrieval/canopy.tif                  pixels that see the c
         plots/{plot}/retrieval/map_{model}_{mask}_{network}.tif   chlorophyll with its interval
         plots/{plot}/retrieval/accuracy_{model}.csv, trees_{model}.csv
         chlorophyll/accuracy.csv, chlorophyll/map.tif      of all; map of the first plot
-        chlorophyll/{plot}_*.png                           figures
+        chlorophyll/{plot}_*.png, {plot}_report.html       figures, and all of a plot on one page
 """
 
 
@@ -50,6 +50,8 @@ rule training_set:
         unpack(simulation),
         canopy=plot_file("retrieval/canopy.tif"),
         summary=plot_file("scene/summary.json"),
+        sun=SUN,
+        sky=SKYLIGHT,
         responses=RESPONSES,
         code=code("training_set"),
     output:
@@ -67,7 +69,7 @@ rule training_set:
     params:
         bands=BANDS,
         leaves_and_soils=leaves_and_soils,
-        light=simulated_light,
+        bark=BARK,
         selection=SELECTION,
         max_entries=RETRIEVAL.max_entries,
         sail={
@@ -254,3 +256,39 @@ rule chlorophyll_figures:
         said("figures of {wildcards.plot}")
     script:
         "../../scripts/chlorophyll_figures.py"
+
+
+rule plot_page:
+    input:
+        found=plot_input_facts,
+        sun=SUN,
+        sky=SKYLIGHT,
+        summary=plot_file("scene/summary.json"),
+        maps=of_plot("map_{model}_{mask}_{network}.tif"),
+        intervals=of_plot("interval_{model}_{mask}_{network}.json"),
+        accuracy=[
+            plot_file(f"retrieval/accuracy_{model}.csv") for model in RETRIEVAL.models
+        ],
+        trees=[plot_file(f"retrieval/trees_{model}.csv") for model in RETRIEVAL.models],
+        figures=[results(f"chlorophyll/{{plot}}_{name}.png") for name in PLOT_FIGURES],
+        code=code("plot_page"),
+    output:
+        page=results("chlorophyll/{plot}_report.html"),
+    log:
+        logs("plot_page_{plot}"),
+    benchmark:
+        benchmarks("plot_page_{plot}")
+    conda:
+        "../../envs/dapple.yaml"
+    threads: 1
+    resources:
+        mem_mb=500,
+    params:
+        plot="{plot}",
+        bands=CAMERA.names,
+        taught=TAUGHT,
+        range_quantile=RETRIEVAL.range_quantile,
+    message:
+        said("a page about {wildcards.plot}")
+    script:
+        "../../scripts/plot_page.py"

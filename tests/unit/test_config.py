@@ -219,6 +219,13 @@ CONTRADICTIONS = {
             "chlorophyll.world.lcc_range_ug_cm2",
         ),
     ],
+    "own_plot": [
+        ({"chlorophyll": {"plots": ["user"]}}, "no `chlorophyll.user.lidar`"),
+        (
+            {"chlorophyll": {"plots": ["user"], "user": {"lidar": "a.laz", "images": "a.tif"}}},
+            "without the sun",
+        ),
+    ],
     "stability": [({"stability": {"stressors": ["wnd"]}}, "stability.stressors: wnd")],
 }
 

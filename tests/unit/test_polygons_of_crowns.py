@@ -1,24 +1,32 @@
-"""Crowns of field trees keep their outlines and chlorophyll, and bad files say what is wrong."""
+"""Crowns keep their outlines and chlorophyll, in any format, and bad files say what is wrong."""
 
 import json
 
+import geopandas
 import numpy as np
 import pytest
+import shapely
 
 from dapple.errors import InputError
-from dapple.formats import geojson
+from dapple.formats import vectors
 
 CORNER = np.array([612_000.0, 5_324_000.0])
 SQUARE = CORNER + np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
+SECOND = SQUARE + 5
 
 
 @pytest.fixture
 def crowns():
-    return geojson.of_rings([SQUARE, SQUARE + 5], [3, 8], [31.5, 52.25], "EPSG:25832")
+    return vectors.of_rings([SQUARE, SECOND], [3, 8], [31.5, 52.25], "EPSG:25832")
+
+
+def frame(polygons=None, crs="EPSG:25832", **columns):
+    polygons = [shapely.Polygon(SQUARE), shapely.Polygon(SECOND)] if polygons is None else polygons
+    return geopandas.GeoDataFrame(columns, geometry=polygons, crs=crs)
 
 
 def changed(path, crowns, change):
-    geojson.write(path, crowns)
+    vectors.write(path, crowns)
     content = json.loads(path.read_text())
     change(content)
     path.write_text(json.dumps(content))
@@ -26,40 +34,140 @@ def changed(path, crowns, change):
 
 
 def test_a_file_gives_back_what_was_written(crowns, tmp_path):
-    geojson.write(tmp_path / "crowns.geojson", crowns)
-    again = geojson.read(tmp_path / "crowns.geojson")
-    assert again.geometries == crowns.geometries
+    vectors.write(tmp_path / "crowns.geojson", crowns)
+    again = vectors.read(tmp_path / "crowns.geojson")
+    for one, other in zip(again.outlines(), crowns.outlines(), strict=True):
+        np.testing.assert_array_equal(one, other)
     assert again.names == ("3", "8")
     assert again.lcc_ug_cm2.tolist() == [31.5, 52.25]
     assert again.crs == "EPSG:25832"
-    np.testing.assert_array_equal(again.outlines()[1][:-1], SQUARE + 5)
 
 
-def test_features_without_a_name_are_numbered(crowns, tmp_path):
-    path = changed(
-        tmp_path / "a.geojson", crowns, lambda c: [f["properties"].pop("tree") for f in
-                                                   c["features"]],
-    )  # fmt: skip
-    assert geojson.read(path).names == ("1", "2")
+@pytest.mark.parametrize("name", ["crowns.gpkg", "crowns.shp", "crowns.geojson"])
+def test_any_vector_format_is_brought_to_the_system_of_the_images(tmp_path, name):
+    path = tmp_path / name
+    there = frame(tree=["a", "b"], lcc_ug_cm2=[31.5, 52.25]).to_crs("EPSG:3857")
+    there.to_file(path)
+    read = vectors.read(path, crs="EPSG:25832")
+    assert read.names == ("a", "b")
+    assert read.lcc_ug_cm2.tolist() == [31.5, 52.25]
+    assert shapely.Polygon(read.outlines()[0]).symmetric_difference(
+        shapely.Polygon(SQUARE)
+    ).area == pytest.approx(0.0, abs=1e-3)
+
+
+def test_degrees_are_brought_to_metres_where_a_system_is_given(tmp_path):
+    path = tmp_path / "crowns.geojson"
+    frame().to_crs("EPSG:4326").to_file(path)
+    assert vectors.read(path, crs="EPSG:25832").outlines()[0].min(axis=0) == pytest.approx(
+        CORNER, abs=0.02
+    )
+    with pytest.raises(InputError, match="EPSG:4326; expected a projected system"):
+        vectors.read(path)
+
+
+def test_crowns_without_chlorophyll_are_crowns_and_some_may_lack_it(tmp_path):
+    path = tmp_path / "crowns.gpkg"
+    frame().to_file(path)
+    read = vectors.read(path)
+    assert read.names == ("1", "2")
+    assert np.isnan(read.lcc_ug_cm2).all()
+    assert "not held against trees" in read.findings[0].found
+    frame(lcc_ug_cm2=[None, 40.0]).to_file(path)
+    assert np.isnan(vectors.read(path).lcc_ug_cm2[0])
+    assert vectors.read(path).lcc_ug_cm2[1] == 40.0
+    frame(lcc_ug_cm2=["39,5", ""]).to_file(path)
+    assert vectors.read(path).lcc_ug_cm2[0] == 39.5
+
+
+def test_columns_are_found_by_usual_names_or_keys(tmp_path):
+    path = tmp_path / "crowns.gpkg"
+    frame(Baum=["x", "y"], SPAD_converted=[40.0, 50.0]).to_file(path)
+    columns = {"tree_column": "Baum", "lcc_column": "spad_converted"}
+    read = vectors.read(path, **columns)
+    assert read.names == ("x", "y")
+    assert read.lcc_ug_cm2.tolist() == [40.0, 50.0]
+    with pytest.raises(InputError, match="Correct `crowns_tree_column`"):
+        vectors.read(path, tree_column="tree")
+
+
+def test_shapes_of_many_kinds_become_polygons_and_what_is_none_is_left_out_and_said(tmp_path):
+    bowtie = shapely.Polygon([(0, 0), (5, 5), (5, 0), (0, 5)])
+    shapes = [
+        bowtie,
+        shapely.GeometryCollection([shapely.Point(0, 0), shapely.box(0, 0, 1, 1)]),
+        shapely.MultiPolygon([shapely.box(0, 0, 1, 1), shapely.box(2, 2, 3, 3)]),
+        shapely.force_3d(shapely.box(0, 0, 1, 1)),
+        shapely.Point(1, 1),
+        None,
+        shapely.Polygon(),
+    ]
+    path = tmp_path / "crowns.geojson"
+    frame(shapes).to_file(path)
+    read = vectors.read(path)
+    areas = [shapely.geometry.shape(geometry).area for geometry in read.geometries]
+    assert areas == pytest.approx([12.5, 1.0, 2.0, 1.0])
+    said = " ".join(map(str, read.findings))
+    assert "cross themselves in 1 features" in said
+    assert "3 of 7 features without a polygon" in said
+
+
+def test_crowns_beyond_the_images_are_left_out_and_said_and_all_of_them_are_refused(crowns):
+    west, south = CORNER
+    kept = vectors.within(crowns, (west - 1, south - 1, west + 3, south + 3), "a.gpkg")
+    assert kept.names == ("3",)
+    assert "1 of 2 crowns beyond the images" in kept.findings[-1].found
+    with pytest.raises(InputError, match="crowns under the images"):
+        vectors.within(crowns, (0.0, 0.0, 10.0, 10.0), "a.gpkg")
+
+
+def test_a_tree_that_is_there_twice_is_said(tmp_path):
+    path = tmp_path / "crowns.gpkg"
+    frame(tree=["a", "a"], lcc=[30.0, 40.0]).to_file(path)
+    assert "tree a more than once" in vectors.read(path).findings[0].found
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda c: c.pop("crs"), "no crs member"),
-        (lambda c: c["crs"]["properties"].update(name="EPSG:999999"), "one that PROJ knows"),
-        (lambda c: c["features"].clear(), "no features"),
-        (lambda c: c["features"][1]["properties"].pop("lcc_ug_cm2"), "None in feature 2"),
-        (lambda c: c["features"][0]["properties"].update(lcc_ug_cm2=-3), "-3 in feature 1"),
-        (lambda c: c["features"][0]["geometry"].update(type="Point"), "a Point as feature 1"),
+        (lambda c: c.pop("crs"), "no projected system"),
+        (lambda c: c["features"].clear(), "no features|nothing that GDAL reads"),
+        (lambda c: c["features"][0]["properties"].update(lcc_ug_cm2=-3), "-3(.0)? in feature 1"),
+        (lambda c: c["features"][0]["properties"].update(lcc_ug_cm2=0), "0(.0)? in feature 1"),
+        (
+            lambda c: [f.update(geometry={"type": "Point", "coordinates": [1, 2]})
+                       for f in c["features"]],
+            "no polygon with an area",
+        ),
     ],
-)
+)  # fmt: skip
 def test_what_is_wrong_is_said(crowns, tmp_path, change, message):
     with pytest.raises(InputError, match=message):
-        geojson.read(changed(tmp_path / "a.geojson", crowns, change))
+        vectors.read(changed(tmp_path / "a.geojson", crowns, change))
+
+
+def test_files_that_are_no_vectors_are_refused(tmp_path):
+    with pytest.raises(InputError, match="no file"):
+        vectors.read(tmp_path / "none.gpkg")
+    (tmp_path / "a.gpkg").write_text("crowns")
+    with pytest.raises(InputError, match="nothing that GDAL reads"):
+        vectors.read(tmp_path / "a.gpkg")
+    frame(tree=["a", "b"]).to_file(tmp_path / "a.shp")
+    (tmp_path / "a.dbf").unlink()
+    with pytest.raises(InputError, match=r"a Shapefile without its \.dbf"):
+        vectors.read(tmp_path / "a.shp")
+
+
+def test_several_layers_need_a_name(tmp_path):
+    path = tmp_path / "crowns.gpkg"
+    for layer in ("north", "south"):
+        frame().to_file(path, layer=layer)
+    with pytest.raises(InputError, match="layers north, south"):
+        vectors.read(path)
+    assert len(vectors.read(path, layer="south").names) == 2
 
 
 def test_another_coordinate_system_is_refused(crowns):
-    geojson.require_crs(crowns, "EPSG:25832", "crowns.geojson")
+    vectors.require_crs(crowns, "EPSG:25832", "crowns.geojson")
     with pytest.raises(InputError, match="crowns in EPSG:25832; expected EPSG:25833"):
-        geojson.require_crs(crowns, "EPSG:25833", "crowns.geojson")
+        vectors.require_crs(crowns, "EPSG:25833", "crowns.geojson")

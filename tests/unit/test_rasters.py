@@ -103,21 +103,6 @@ def test_bands_are_chosen_by_name_and_a_missing_one_is_named(image):
         rasters.select(image, ("450", "840"), "image.tif")
 
 
-@pytest.mark.parametrize(("scale", "remedy"), [(10_000, "10000"), (100, "100")])
-def test_scaled_reflectance_is_refused(image, scale, remedy):
-    rasters.require_reflectance(image, "image.tif")
-    scaled = Raster(image.values * scale, 0.0, 0.0, 0.5, image.crs, BANDS)
-    with pytest.raises(InputError, match=rf"divide it by {remedy} "):
-        rasters.require_reflectance(scaled, "image.tif")
-
-
-def test_a_band_without_data_is_refused(image):
-    values = image.values.copy()
-    values[1] = np.nan
-    with pytest.raises(InputError, match="no data in band 560"):
-        rasters.require_reflectance(Raster(values, 0, 0, 0.5, image.crs, BANDS), "image.tif")
-
-
 def test_the_share_of_overlap_is_that_of_the_area(image):
     share = rasters.require_overlap(
         image, (612_010.0, 5_324_000.0), (612_100.0, 5_324_100.0), "EPSG:25832",

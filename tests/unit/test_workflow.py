@@ -44,7 +44,7 @@ def test_a_correction_that_is_turned_off_does_not_count():
 
 
 def test_r_code_counts_as_well():
-    assert "stats/correlation.R" in modules("statistics")
+    assert "stats/correlation.R" in modules("record_statistics")
 
 
 def test_every_script_is_made_of_something():

@@ -14,7 +14,7 @@ from tests.workflow.project import SMALL, copy_of_project
 # What follows from what.
 PAGE = "runtime page"
 CONFIGURED = f"configuration {PAGE}"
-COMPARED = "records statistics comparison_figures series_figure verdict"
+COMPARED = "records record_statistics comparison_figures series_figure verdict"
 
 
 def checked(n):
@@ -60,7 +60,7 @@ KEYS = {
     "light={timestep: {step_min: 120}}": "timesteps*4 reference*4 agreement",
     "light={sun_diameter_deg: 0.5}": SKY,
     "ground_z_m=-0.1": f"scan clean {CLASSES} sensors".replace(traced(3), traced(4)),
-    "statistics={confidence: 0.9}": "statistics comparison_figures",
+    "statistics={confidence: 0.9}": "record_statistics comparison_figures",
     "figures={map_spacing_m: 0.4}": MAP,
     "figures={sensors: [1_1]}": "series_figure",
     "survey={grown: 3}": "",
@@ -81,7 +81,7 @@ CODE = {
     "light/timestep.py": OWN_CHECK,
     "light/moved_sensors.py": "verdict",
     "registration/fit.py": "",  # nothing is fitted
-    "stats/correlation.R": "statistics comparison_figures",
+    "stats/correlation.R": "record_statistics comparison_figures",
     "stats/agreement.py": "agreement",
     "verdict/verdict_model.json": "verdict",
     "figures/tree.py": "tree_figure",

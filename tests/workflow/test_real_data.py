@@ -113,5 +113,5 @@ def test_the_published_tree_can_be_planned_from_its_own_records(tmp_path):
     project = project_on_real_data(tmp_path, "apple", "apple/bark.obj")
     planned = project.planned()
     assert {"real_wood", "virtual_leaves", "registration", "voxels", "light"} <= planned
-    assert {"statistics", "page"} <= planned
+    assert {"record_statistics", "page"} <= planned
     assert not {"plant", "ingest"} & planned

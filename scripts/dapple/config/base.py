@@ -30,6 +30,7 @@ def _moment(value: Any) -> Any:
 
 
 Moment = Annotated[str, BeforeValidator(_moment)]
+MomentOrNone = Annotated[str, BeforeValidator(lambda value: _moment(value) if value else "")]
 LeafAngles = Literal[
     "spherical", "planophile", "erectophile", "plagiophile", "extremophile", "uniform"
 ]

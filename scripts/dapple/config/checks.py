@@ -266,5 +266,6 @@ CHECKS = (
     study_checks.survey,
     study_checks.survey_beams,
     study_checks.chlorophyll,
+    study_checks.own_plot,
     study_checks.stability,
 )

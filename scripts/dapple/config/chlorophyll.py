@@ -6,8 +6,18 @@ from typing import Annotated, Literal
 
 from annotated_types import Ge, Gt, Le, Lt
 
-from dapple.config.base import Count, NotNegative, Positive, Section, Share, Some, key
-from dapple.optics.cameras import ZHAO as ZHAO_CAMERA
+from dapple.config.base import (
+    Count,
+    MomentOrNone,
+    NotNegative,
+    OneOf,
+    Positive,
+    Section,
+    Share,
+    Some,
+    key,
+)
+from dapple.optics.cameras import CAMERAS
 
 ZHAO = "Zhao et al. 2025"
 ZHANG = "Zhang et al. 2016"
@@ -16,14 +26,47 @@ GridRange = tuple[NotNegative, NotNegative, Count]
 Spectrum = Some[tuple[Positive, Share]]
 
 
-class Plot(Section):
-    """A plot: its virtual trees and the flight over it, or files of a real one."""
+class OwnPlot(Section):
+    """Your own plot: its files, and when they were taken."""
 
-    lidar: str = key("", "LAZ of a real plot, relative to data_dir; empty: the virtual plot")
-    images: str = key(
-        "", "GeoTIFF of a real plot whose bands have the camera's names, relative to data_dir"
+    lidar: str = key("", "LAS or LAZ of the plot, relative to data_dir")
+    images: str = key("", "reflectance as GeoTIFF, in any coordinate system, relative to data_dir")
+    band_order: tuple[Count, ...] = key(
+        (), "number of the image's band for each of the camera; empty: by name, wavelength, colour"
     )
-    crowns: str = key("", "GeoJSON of crowns with `lcc_ug_cm2`, relative to data_dir")
+    scale: NotNegative = key(0.0, "value that means a reflectance of 1; 0: the file's own, or none")
+    nodata: float | None = key(None, "value that means no data, besides the file's own")
+    crowns: str = key(
+        "", "GeoPackage, Shapefile or GeoJSON of crowns, relative to data_dir; empty: cells only"
+    )
+    crowns_layer: str = key("", "layer of a file with several")
+    crowns_tree_column: str = key("", "names of the trees; empty: by the usual names, or numbered")
+    crowns_lcc_column: str = key(
+        "", "measured leaf chlorophyll [µg/cm²]; empty: by the usual names, or none"
+    )
+    sun_zenith_deg: Annotated[float, Ge(0), Le(80)] | None = key(
+        None, "of the images; none: from `time` and the place of the images"
+    )
+    sun_azimuth_deg: Annotated[float, Ge(0), Le(360)] | None = key(
+        None, "of the images, from north over east; none: from `time`"
+    )
+    time: MomentOrNone = key(
+        "", "middle of the flight, as 2024-07-01 11:30; not needed with both angles"
+    )
+    timezone: str = key("UTC", "zone of `time` where it has no offset of its own")
+    diffuse_share: tuple[tuple[Positive, Share], ...] = key(
+        (),
+        "of the light on level ground, from the sky: wavelength [nm] and share, linear between; "
+        "empty: a cloudless sky",
+    )
+    shoot_recollision: Annotated[float, Ge(0), Lt(1)] = key(
+        0.0, "chance that light scattered by a needle meets its own shoot; 0: broad leaves"
+    )
+
+
+class Plot(Section):
+    """A virtual plot: its trees and the flight over it."""
+
     size_m: tuple[Positive, Positive] = key((50.0, 50.0), "edges east and north", ZHAO)
     cover: Annotated[float, Gt(0), Le(0.95)] = key(0.62, "canopy cover", ZHAO)
     species: Literal["larch", "spruce"] = key("larch", "of the virtual trees")
@@ -251,10 +294,11 @@ class Chlorophyll(Section):
     """Leaf chlorophyll from UAV images and UAV LiDAR."""
 
     plots: Some[Literal["larch", "spruce", "user"]] = key(("larch", "spruce"), "plots to map")
-    bands: Some[tuple[str, Positive, Positive]] = key(
-        tuple((band.name, band.centre_nm, band.width_nm) for band in ZHAO_CAMERA),
-        "of the camera: name in the images, centre and width [nm]",
-        ZHAO,
+    camera: Annotated[str, OneOf(CAMERAS)] = key(
+        "p4m", "that took the images: its bands, by their makers' data", ZHAO
+    )
+    bands: tuple[tuple[str, Positive, Positive], ...] = key(
+        (), "of another camera: name in the images, centre and width [nm]"
     )
     responses: str = key(
         "", "CSV of wavelength_nm and a response by name of band, relative to data_dir; empty: flat"
@@ -279,8 +323,14 @@ class Chlorophyll(Section):
         shoot_recollision=0.23,
         field_trees=17,
     )
-    user: Plot = Plot()
+    user: OwnPlot = OwnPlot()
     world: World = World()
     crowns: Crowns = Crowns()
     images: Images = Images()
     retrieval: Retrieval = Retrieval()
+
+    @property
+    def camera_bands(self) -> tuple[tuple[str, float, float], ...]:
+        """Name, centre and width [nm] of the camera's bands."""
+        named = CAMERAS[self.camera]
+        return self.bands or tuple((band.name, band.centre_nm, band.width_nm) for band in named)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dapple.config.chlorophyll import GridRange
+from dapple import clock
+from dapple.config.chlorophyll import GridRange, OwnPlot
 from dapple.errors import InputError
 from dapple.optics.cameras import camera
 from dapple.stability import stressors
@@ -79,18 +80,45 @@ def survey_beams(settings: Settings, where: str) -> None:
             )
 
 
+def own_plot(settings: Settings, where: str) -> None:
+    """A plot of the user's has its files, and a sun."""
+    plot = settings.chlorophyll.user
+    if "user" not in settings.chlorophyll.plots:
+        return
+    for name in ("lidar", "images"):
+        if not getattr(plot, name):
+            raise InputError(
+                where,
+                f"`chlorophyll.plots` with `user` and no `chlorophyll.user.{name}`",
+                "LiDAR and images of the plot, relative to data_dir",
+                f"Set `chlorophyll.user.{name}`.",
+            )
+    if plot.time:
+        clock.time_range(plot.time, plot.time, 1.0, plot.timezone, f"{where}, chlorophyll.user")
+    elif plot.sun_zenith_deg is None or plot.sun_azimuth_deg is None:
+        raise InputError(
+            where,
+            "`chlorophyll.user` without the sun of its images",
+            "`time` of the flight, or `sun_zenith_deg` and `sun_azimuth_deg`",
+            "Set `chlorophyll.user.time` to the middle of the flight, as 2024-07-01 11:30, and "
+            "`timezone` to the zone of that clock.",
+        )
+
+
 def chlorophyll(settings: Settings, where: str) -> None:
     """Bands tell sunlit leaves, plots hold pixels and trees, grids of leaves run upwards."""
     section = settings.chlorophyll
-    names = [name for name, _, _ in section.bands]
+    names = [name for name, _, _ in section.camera_bands]
     if len(set(names)) < len(names):
         raise InputError(
             where, f"`chlorophyll.bands` named {names}", "each name once", "Rename one of them."
         )
     if "sunlit" in section.retrieval.masks:
-        _ = camera(section.bands).near_infrared
+        _ = camera(section.camera_bands).near_infrared
     for name in section.plots:
         plot = getattr(section, name)
+        if isinstance(plot, OwnPlot):
+            continue
         for key, pixel_m in (("images", section.images.pixel_m), (name, plot.pixel_m)):
             if pixel_m > min(plot.size_m):
                 raise InputError(

@@ -116,6 +116,9 @@ def field(trees: pd.DataFrame, accuracy: pd.DataFrame) -> Figure:
     accuracy : DataFrame
         Scores of the same `model, mask, network`, written into the panels.
     """
+    trees = trees[np.isfinite(trees["truth_ug_cm2"].astype(float))]
+    if trees.empty:
+        return _nothing_known()
     rows, models = _rows(trees), list(dict.fromkeys(trees["model"]))
     figure, panels = _grid(rows, models, 2.4, 2.6)
     for i, row in enumerate(rows):
@@ -133,6 +136,13 @@ def field(trees: pd.DataFrame, accuracy: pd.DataFrame) -> Figure:
                 _numbers(axes, scores.iloc[0])
     figure.supxlabel(f"chlorophyll of the tree [{UNIT}]", fontsize=9)
     figure.supylabel(f"retrieved, with its interval [{UNIT}]", fontsize=9)
+    return figure
+
+
+def _nothing_known() -> Figure:
+    figure = style.new_figure(7.0, 1.2)
+    figure.text(0.5, 0.5, "No tree has measured chlorophyll: the map is not held against any.",
+                ha="center", va="center", fontsize=9)  # fmt: skip
     return figure
 
 
@@ -219,9 +229,9 @@ def chlorophyll_map(
     size_m : two floats
         Extent east and north of the images [m], where the last cells may be cut.
     rings : sequence of (k, 2) arrays
-        Outlines of crowns with known chlorophyll, from the north-west corner east and south [m].
+        Outlines of crowns, from the north-west corner east and south [m].
     truth : sequence of float
-        Their chlorophyll, which fills them in the first panel's colours.
+        Their chlorophyll, which fills them in the first panel's colours; NaN: only an outline.
     """
     figure = style.new_figure(8.6, 0.9 + 3.3 * size_m[1] / size_m[0])
     left, right = figure.subplots(1, 2)
@@ -240,7 +250,8 @@ def chlorophyll_map(
                label="beyond the training range")  # fmt: skip
     if len(row):
         right.legend(loc="lower left", frameon=True, fontsize=7)
-    left.set_title("retrieved, and crowns with their truth" if len(rings) else "retrieved")
+    known = np.isfinite(np.asarray(truth, float)).any()
+    left.set_title("retrieved, and crowns with their truth" if known else "retrieved")
     right.set_title("how far to trust it")
     for axes in (left, right):
         axes.grid(False)

@@ -3,7 +3,7 @@
 import base64
 import html
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import pandas as pd
@@ -55,20 +55,28 @@ def build(experiment: str, folder: Path, captions: Mapping[str, str]) -> str:
     parts.append(_structure(folder))
     for name, title in TABLES.items():
         if (path := folder / name).is_file():
-            parts += [f"<h2>{title}</h2>", _table(pd.read_csv(path))]
+            parts += [f"<h2>{title}</h2>", table(pd.read_csv(path))]
     for name, caption in captions.items():
         if (path := folder / name).is_file():
-            text = html.escape(caption)
-            data = base64.b64encode(path.read_bytes()).decode()
-            parts.append(
-                f'<figure><img alt="{text}" src="data:image/png;base64,{data}">'
-                f"<figcaption>{text}</figcaption></figure>"
-            )
-    body = "\n".join(parts)
-    title = html.escape(f"dapple: {experiment}")
+            parts.append(figure(path, caption))
+    return page(f"dapple: {experiment}", parts)
+
+
+def page(title: str, parts: Iterable[str]) -> str:
+    """A whole HTML page of parts that are HTML."""
+    body, title = "\n".join(parts), html.escape(title)
     return (
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
         f"<style>{STYLE}</style></head><body>\n{body}\n</body></html>\n"
+    )
+
+
+def figure(path: Path, caption: str) -> str:
+    """A picture within the page."""
+    text, data = html.escape(caption), base64.b64encode(path.read_bytes()).decode()
+    return (
+        f'<figure><img alt="{text}" src="data:image/png;base64,{data}">'
+        f"<figcaption>{text}</figcaption></figure>"
     )
 
 
@@ -102,19 +110,26 @@ def _verdict(folder: Path) -> str:
 def _noticed(folder: Path) -> str:
     """What was noticed about the files that a run was given; nothing where nothing was."""
     facts = [json.loads(path.read_text()) for name in NOTICED if (path := folder / name).is_file()]
-    rows = [one for table in facts for one in table.get("findings", ())]
-    rows.sort(key=lambda one: LEVELS.index(one["level"]))
     share = next((t["modelled_share_of_day"] for t in facts if "modelled_share_of_day" in t), 0.0)
     lines = []
-    for one in rows:
-        expected = f"; expected {one['expected']}" if one["expected"] else ""
-        text = f"{one['where']}: {one['found']}{expected}. {one['remedy']}"
-        lines.append(f"<li><b>{one['level']}</b> {html.escape(text)}</li>")
     if share:
         lines.append(
             f"<li>Radiation is modelled, not measured, at {100 * share:.0f} % of the times with "
             "the sun up.</li>"
         )
+    return noticed(facts, lines)
+
+
+def noticed(facts: Iterable[Mapping], more: Iterable[str] = ()) -> str:
+    """Findings of several files of facts as a list, errors first; nothing where there are none."""
+    rows = [one for some in facts for one in some.get("findings", ())]
+    rows.sort(key=lambda one: LEVELS.index(one["level"]))
+    lines = []
+    for one in rows:
+        expected = f"; expected {one['expected']}" if one["expected"] else ""
+        text = f"{one['where']}: {one['found']}{expected}. {one['remedy']}"
+        lines.append(f"<li><b>{one['level']}</b> {html.escape(text)}</li>")
+    lines += more
     if not lines:
         return ""
     return "\n".join(["<h2>What was noticed about the input</h2><ul>", *lines, "</ul>"])
@@ -131,15 +146,16 @@ def _structure(folder: Path) -> str:
         path.parent.name: json.loads(path.read_text())
         for path in sorted(folder.glob("structure/*/summary.json"))
     }
-    table = pd.DataFrame(facts).T
-    table = table[[name for name in table if table[name].map(_is_plain).all()]]
-    table.index.name = "reconstruction"
-    return "<h2>Structure</h2>\n" + _table(table.reset_index())
+    found = pd.DataFrame(facts).T
+    found = found[[name for name in found if found[name].map(_is_plain).all()]]
+    found.index.name = "reconstruction"
+    return "<h2>Structure</h2>\n" + table(found.reset_index())
 
 
 def _is_plain(value: object) -> bool:
     return value is None or isinstance(value, int | float | str)
 
 
-def _table(table: pd.DataFrame) -> str:
-    return table.to_html(index=False, na_rep="", float_format=lambda value: f"{value:.4g}")
+def table(frame: pd.DataFrame) -> str:
+    """A table of plain numbers."""
+    return frame.to_html(index=False, na_rep="", float_format=lambda value: f"{value:.4g}")

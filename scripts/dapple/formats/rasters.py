@@ -12,9 +12,6 @@ from rasterio.transform import Affine
 from dapple.errors import InputError
 from dapple.formats.atomic import atomic
 
-LARGEST_REFLECTANCE = 2.0
-"""Specular glints pass 1; what passes this by much is scaled by 100 or 10000."""
-
 
 @dataclass(frozen=True)
 class Raster:
@@ -145,29 +142,6 @@ def select(raster: Raster, bands: Sequence[str], where: str | Path) -> Raster:
         )
     index = [raster.bands.index(band) for band in bands]
     return replace(raster, values=raster.values[index], bands=tuple(bands))
-
-
-def require_reflectance(raster: Raster, where: str | Path) -> None:
-    """Raise InputError where values cannot be reflectances from 0 to 1.
-
-    Glints may pass 1 and noise may pass below 0; the 99th percentile of a band may not pass
-    `LARGEST_REFLECTANCE`, nor may a band be empty.
-    """
-    for band, values in zip(raster.bands, raster.values, strict=True):
-        there = values[np.isfinite(values)]
-        if not there.size:
-            raise InputError(
-                where, f"no data in band {band}", "reflectance", "Export the image again."
-            )
-        high = float(np.percentile(there, 99))
-        if high > LARGEST_REFLECTANCE:
-            scale = 10_000 if high > 100 else 100
-            raise InputError(
-                where,
-                f"values up to {high:g} in band {band}",
-                "reflectance from 0 to 1",
-                f"The image looks scaled: divide it by {scale} (or set the file's scale).",
-            )
 
 
 def same_crs(one: str, other: str) -> bool:

@@ -90,16 +90,25 @@ class Camera:
         )
 
 
-ZHAO = Camera(
-    (
-        Band("450", 450.0, 32.0),
-        Band("560", 560.0, 32.0),
-        Band("650", 650.0, 32.0),
-        Band("730", 730.0, 32.0),
-        Band("840", 840.0, 52.0),
-    )
-)
+def _named(*rows: tuple[float, float]) -> Camera:
+    """A camera whose bands are called by their centres."""
+    return Camera(tuple(Band(f"{centre:g}", centre, width) for centre, width in rows))
+
+
+ZHAO = _named((450.0, 32.0), (560.0, 32.0), (650.0, 32.0), (730.0, 32.0), (840.0, 52.0))
 """Blue, green, red, red edge and near infrared of a multispectral UAV camera (Zhao et al. 2025)."""
+_REDEDGE_MX = _named((475.0, 32.0), (560.0, 27.0), (668.0, 14.0), (717.0, 12.0), (842.0, 57.0))
+CAMERAS = {
+    "p4m": ZHAO,
+    "mavic3m": _named((560.0, 32.0), (650.0, 32.0), (730.0, 32.0), (860.0, 52.0)),
+    "rededge-m": _named((475.0, 20.0), (560.0, 20.0), (668.0, 10.0), (717.0, 10.0), (840.0, 40.0)),
+    "rededge-mx": _REDEDGE_MX,
+    "altum": _REDEDGE_MX,
+    "sequoia": _named((550.0, 40.0), (660.0, 40.0), (735.0, 10.0), (790.0, 40.0)),
+    "sentinel-2": _named((492.0, 66.0), (560.0, 36.0), (665.0, 31.0), (704.0, 15.0), (740.0, 15.0),
+                         (783.0, 20.0), (833.0, 106.0)),
+}  # fmt: skip
+"""Nominal centres and widths; Altum's thermal band is none of reflectance."""
 
 
 def camera(rows: Sequence[tuple[str, float, float]], responses: str | Path = "") -> Camera:

@@ -68,6 +68,12 @@ def over_seeds(
     return [*rows, mean | {"n": together["n"], "seed": "mean"}, together | {"seed": "ensemble"}]
 
 
+def no_trees() -> pd.DataFrame:
+    """A table of trees without any."""
+    names = ("truth_ug_cm2", "predicted_ug_cm2", "low_ug_cm2", "high_ug_cm2")
+    return pd.DataFrame({"tree": pd.Series(dtype=str)} | {n: pd.Series(dtype=float) for n in names})
+
+
 def area_weights(
     geometry: Mapping,
     *,

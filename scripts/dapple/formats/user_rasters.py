@@ -1,0 +1,378 @@
+"""Images as people bring them: any grid, scale and order of bands, made into one kind of raster."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyproj
+import rasterio
+import rasterio.warp
+from rasterio.enums import ColorInterp, Resampling
+from rasterio.transform import Affine
+from rasterio.vrt import WarpedVRT
+from rasterio.windows import Window
+
+from dapple import findings
+from dapple.errors import InputError
+from dapple.findings import Finding
+from dapple.formats import raster_bands
+from dapple.formats.raster_bands import CameraBand
+from dapple.formats.rasters import Raster, same_crs
+
+KNOWN_NODATA = (-10_000.0, -9999.0, -32_767.0, -32_768.0, -99_999.0, -3.4028234663852886e38)
+"""What programs write where an image has no data: no reflectance is so low."""
+SCALES = {
+    32_768.0: "MicaSense, Metashape",
+    65_535.0: "16 bits",
+    10_000.0: "Sentinel, DJI Terra",
+    255.0: "8 bits",
+    100.0: "percent",
+}
+LARGEST = 2.0
+"""Specular glints pass 1; what passes this by much is scaled."""
+LOWEST = -0.05
+DARKEST_BRIGHTEST = 0.05
+"""The brightest band of vegetation reflects more than this."""
+MOST_VALUES = 400_000_000
+
+
+@dataclass(frozen=True)
+class UserRaster:
+    """An image as it is used, and how it came about.
+
+    Attributes
+    ----------
+    raster : Raster
+        Reflectance by band of the camera; NaN where there are no data.
+    findings : tuple of Finding
+    facts : dict
+    """
+
+    raster: Raster
+    findings: tuple[Finding, ...]
+    facts: dict
+
+
+def read(
+    path: str | Path,
+    camera: Sequence[CameraBand],
+    *,
+    crs: str = "",
+    bounds_m: Sequence[float] | None = None,
+    scale: float = 0.0,
+    nodata: float | None = None,
+    band_order: Sequence[int] = (),
+    hint: str = "",
+) -> UserRaster:
+    """Read reflectance images.
+
+    Parameters
+    ----------
+    path : path
+        GeoTIFF or what else GDAL opens.
+    camera : sequence of bands
+        Name, centre and width of each band that is wanted.
+    crs : str
+        Coordinate system into which the images are warped; empty: their own, or, where that is in
+        degrees, the UTM zone of the place.
+    bounds_m : four floats or None
+        West, south, east, north beyond which nothing is read, in `crs` [m].
+    scale : float
+        Value that means a reflectance of 1; 0: the file's own scale, or none.
+    nodata : float or None
+        Value that means no data, besides the file's own.
+    band_order : sequence of int
+        Number of the image's band, from 1, for each band of the camera; empty: found.
+    hint : str
+        What else would help where bands do not fit, for messages.
+
+    Raises
+    ------
+    InputError
+        No such file, no raster, no coordinate system, bands that do not fit, no overlap, an image
+        too large, or values that are no reflectance.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(path, "no file", "images", "Check the path in the configuration.")
+    noticed: list[Finding] = []
+    try:
+        with rasterio.open(path) as file:
+            masks = _masks(file, len(camera))
+            spectral = [k for k in range(1, file.count + 1) if k not in masks]
+            texts = [file.descriptions[k - 1] or "" for k in spectral]
+            tags = [file.tags(k) for k in spectral]
+            order, how = raster_bands.match(
+                camera, texts, tags, order=band_order, where=path, hint=hint
+            )
+            chosen = [spectral[k] for k in order]
+            target = _target(path, file, crs)
+            empty = _nodata(file, chosen, nodata)
+            values, valid, transform = _read(path, file, chosen, masks, target, empty, bounds_m)
+            scales = np.array([file.scales[k - 1] for k in chosen])
+            offsets = np.array([file.offsets[k - 1] for k in chosen])
+            is_integer = np.issubdtype(file.dtypes[chosen[0] - 1], np.integer)
+            is_warped = not _fits(file, target)
+    except rasterio.errors.RasterioError as error:
+        raise InputError(
+            path, f"no readable raster ({error})", "a GeoTIFF", "Copy or export the file again."
+        ) from error
+    values, gone = _without_data(values, valid, empty)
+    if how == "by order, for they have no names":
+        noticed.append(
+            findings.warning(
+                path,
+                f"{len(chosen)} bands without names",
+                f"bands {', '.join(band.name for band in camera)}",
+                "They are taken in this order; set `band_order` if it is another.",
+            )
+        )
+    if is_warped:
+        noticed.append(findings.note(path, f"images in {file.crs}, warped to {target}"))
+    noticed += [
+        findings.note(path, f"{share:.1%} of pixels {text}") for text, share in gone.items()
+    ]
+    values, factor = _reflectance(path, values, scale, scales, offsets, is_integer)
+    _check(path, values, camera)
+    names = tuple(band.name for band in camera)
+    raster = Raster(
+        values.astype(np.float32), transform.c, transform.f, float(transform.a), target, names
+    )
+    facts = {
+        "path": str(path),
+        "bands": {
+            band.name: texts[k] or str(spectral[k]) for band, k in zip(camera, order, strict=True)
+        },
+        "bands_found": how,
+        "crs": target,
+        "pixel_m": raster.pixel_m,
+        "scale": factor,
+        "without_data": gone,
+    }
+    return UserRaster(raster, tuple(noticed), facts)
+
+
+def _masks(file: rasterio.DatasetReader, n_bands: int) -> list[int]:
+    """Numbers of bands that say where there are data: alpha, or called mask."""
+    named = [k for k, text in enumerate(file.descriptions, start=1)
+             if (text or "").lower().strip() in ("alpha", "mask", "opacity")]  # fmt: skip
+    alpha = [k for k, kind in enumerate(file.colorinterp, start=1) if kind == ColorInterp.alpha]
+    last = file.count
+    if not named and not alpha and last > n_bands and not file.descriptions[last - 1]:
+        few = np.unique(file.read(last, out_shape=(min(file.height, 256), min(file.width, 256))))
+        if len(few) <= 2 and set(few.tolist()) <= {0, 1, 255, 65_535}:
+            return [last]
+    return sorted({*named, *alpha})
+
+
+def _target(path: Path, file: rasterio.DatasetReader, crs: str) -> str:
+    """The projected system in which the images are used."""
+    if file.crs is None:
+        raise InputError(
+            path,
+            "no coordinate system",
+            "the one in which the images were made",
+            "Assign it (gdal_edit.py -a_srs EPSG:…).",
+        )
+    if crs:
+        return crs
+    own = pyproj.CRS(file.crs.to_wkt())
+    if own.is_projected:
+        return str(file.crs.to_string())
+    west, south, east, north = rasterio.warp.transform_bounds(file.crs, "EPSG:4326", *file.bounds)
+    zone = int((0.5 * (west + east) + 180.0) // 6.0) + 1
+    return f"EPSG:{32600 + zone if 0.5 * (south + north) >= 0 else 32700 + zone}"
+
+
+def _fits(file: rasterio.DatasetReader, target: str) -> bool:
+    """Whether the file's own grid can be taken: its system, square pixels, rows to the south."""
+    grid = file.transform
+    is_square = np.isclose(grid.a, -grid.e, rtol=1e-6) and grid.a > 0 and not grid.b and not grid.d
+    return bool(is_square and same_crs(file.crs.to_string(), target))
+
+
+def _nodata(
+    file: rasterio.DatasetReader, chosen: Sequence[int], declared: float | None
+) -> list[float]:
+    """Values that mean no data: declared, the file's own, and known ones."""
+    own = [file.nodatavals[k - 1] for k in chosen if file.nodatavals[k - 1] is not None]
+    given = [declared] if declared is not None else []
+    return list(dict.fromkeys([*given, *map(float, own), *KNOWN_NODATA]))
+
+
+def _read(
+    path: Path,
+    file: rasterio.DatasetReader,
+    chosen: Sequence[int],
+    masks: Sequence[int],
+    target: str,
+    empty: Sequence[float],
+    bounds_m: Sequence[float] | None,
+) -> tuple[np.ndarray, np.ndarray, Affine]:
+    """Values (b, rows, columns), where masks allow them (rows, columns), and the grid."""
+    if _fits(file, target):
+        source, transform, shape = file, file.transform, (file.height, file.width)
+        window = _window(path, transform, shape, bounds_m)
+        _bound(path, window, len(chosen))
+        values = source.read(list(chosen), window=window, out_dtype=np.float64)
+        mask = source.read(list(masks), window=window) if masks else None
+        own = source.read_masks(list(chosen), window=window) > 0
+    else:
+        options = {
+            "crs": target,
+            "resampling": Resampling.nearest,
+            "nodata": None if masks else _one(empty, file, chosen),
+        }
+        with WarpedVRT(file, **options) as plain:
+            square = _square(plain)
+        with WarpedVRT(file, **options, **square) as source:
+            transform, shape = source.transform, (source.height, source.width)
+            window = _window(path, transform, shape, bounds_m)
+            _bound(path, window, len(chosen))
+            values = source.read(list(chosen), window=window, out_dtype=np.float64)
+            mask = source.read(list(masks), window=window) if masks else None
+            own = source.read_masks(list(chosen), window=window) > 0
+    valid = own.all(axis=0) & (True if mask is None else (mask > 0).all(axis=0))
+    corner = (
+        transform.c + window.col_off * transform.a,
+        transform.f - window.row_off * transform.a,
+    )
+    return values, valid, Affine(transform.a, 0, corner[0], 0, -transform.a, corner[1])
+
+
+def _square(warped: WarpedVRT) -> dict[str, Any]:
+    """The grid that warping gives, with the finer edge of its pixels for both."""
+    grid = warped.transform
+    pixel_m = min(grid.a, -grid.e)
+    return {
+        "transform": Affine(pixel_m, 0.0, grid.c, 0.0, -pixel_m, grid.f),
+        "width": int(np.ceil(round(warped.width * grid.a / pixel_m, 6))),
+        "height": int(np.ceil(round(warped.height * -grid.e / pixel_m, 6))),
+    }
+
+
+def _one(
+    empty: Sequence[float], file: rasterio.DatasetReader, chosen: Sequence[int]
+) -> float | None:
+    """A value that fits the file's type, to fill what lies beyond it when it is turned."""
+    kind = np.dtype(file.dtypes[chosen[0] - 1])
+    if np.issubdtype(kind, np.floating):
+        return float(empty[0])
+    limits = np.iinfo(kind)
+    return next((v for v in empty if limits.min <= v <= limits.max), None)
+
+
+def _window(
+    path: Path, transform: Affine, shape: tuple[int, int], bounds_m: Sequence[float] | None
+) -> Window:
+    """Whole pixels within the bounds.
+
+    Raises
+    ------
+    InputError
+        There are none.
+    """
+    rows, columns = shape
+    if bounds_m is None:
+        return Window(0, 0, columns, rows)
+    west, south, east, north = bounds_m
+    left, top, pixel_m = transform.c, transform.f, transform.a
+    first, last = (np.floor((west - left) / pixel_m), np.ceil((east - left) / pixel_m))
+    upper, lower = (np.floor((top - north) / pixel_m), np.ceil((top - south) / pixel_m))
+    first, upper = max(int(first), 0), max(int(upper), 0)
+    last, lower = min(int(last), columns), min(int(lower), rows)
+    if first >= last or upper >= lower:
+        raise InputError(
+            path,
+            f"images of east {left:.1f} to {left + columns * pixel_m:.1f}, north "
+            f"{top - rows * pixel_m:.1f} to {top:.1f} m",
+            f"an overlap with the cloud (east {west:.1f} to {east:.1f}, north {south:.1f} to "
+            f"{north:.1f} m)",
+            "Give images and LiDAR of one place; check both coordinate systems.",
+        )
+    return Window(first, upper, last - first, lower - upper)
+
+
+def _bound(path: Path, window: Window, n_bands: int) -> None:
+    if window.width * window.height * n_bands > MOST_VALUES:
+        raise InputError(
+            path,
+            f"{window.width} × {window.height} pixels in {n_bands} bands",
+            f"{MOST_VALUES:.0e} values at most",
+            "Crop the images to the plot or make their pixels larger (gdalwarp -tr).",
+        )
+
+
+def _without_data(
+    values: np.ndarray, valid: np.ndarray, empty: Sequence[float]
+) -> tuple[np.ndarray, dict[str, float]]:
+    """Values with NaN where there are none, and shares of pixels by reason."""
+    gone: dict[str, float] = {}
+    flagged = np.isin(values, list(empty)).any(axis=0) | ~np.isfinite(values).all(axis=0)
+    black = valid & ~flagged & (values == 0).all(axis=0)
+    for text, missing in (
+        ("outside the image's mask", ~valid & ~flagged),
+        ("flagged as no data", flagged),
+        ("black in all bands, taken as no data", black),
+    ):
+        if missing.any():
+            gone[text] = float(missing.mean())
+    return np.where(valid & ~flagged & ~black, values, np.nan), gone
+
+
+def _reflectance(
+    path: Path,
+    values: np.ndarray,
+    declared: float,
+    scales: np.ndarray,
+    offsets: np.ndarray,
+    is_integer: bool,
+) -> tuple[np.ndarray, float | str]:
+    """Values as reflectance: by the declared scale, the file's own, or as they are."""
+    if declared:
+        return values / declared, declared
+    if (scales != 1.0).any() or (offsets != 0.0).any():
+        return values * scales[:, None, None] + offsets[:, None, None], "the file's own"
+    high = float(np.nanpercentile(values, 99)) if np.isfinite(values).any() else 0.0
+    if is_integer or high > LARGEST:
+        known = ", ".join(
+            f"{scale:g} ({who})" for scale, who in SCALES.items() if scale >= high / 1.5
+        )
+        raise InputError(
+            path,
+            f"{'whole numbers' if is_integer else 'values'} up to {high:g} and no scale",
+            "reflectance from 0 to 1, or the value that means 1",
+            f"Set `scale` of the plot to what the program wrote for a reflectance of 1: {known}.",
+        )
+    return values, 1.0
+
+
+def _check(path: Path, values: np.ndarray, camera: Sequence[CameraBand]) -> None:
+    """Raise an InputError where values cannot be the reflectance of vegetation."""
+    tops = []
+    for band, layer in zip(camera, values, strict=True):
+        there = layer[np.isfinite(layer)]
+        if not there.size:
+            raise InputError(
+                path, f"no data in band {band.name}", "reflectance",
+                "Export the image again; check `nodata` of the plot.",
+            )  # fmt: skip
+        low, high = np.percentile(there, (1, 99))
+        tops.append(high)
+        if low < LOWEST or high > LARGEST:
+            raise InputError(
+                path,
+                f"reflectance of {low:.3g} to {high:.3g} (1 to 99 %) in band {band.name}",
+                f"{LOWEST:g} to {LARGEST:g}",
+                "Check `scale` and `nodata` of the plot.",
+            )
+    if max(tops) < DARKEST_BRIGHTEST:
+        raise InputError(
+            path,
+            f"reflectance of at most {max(tops):.3g} in every band",
+            f"more than {DARKEST_BRIGHTEST:g} in the brightest: leaves reflect a third of the near "
+            "infrared",
+            "Check `scale` of the plot: the images look divided by too much.",
+        )
