@@ -65,7 +65,7 @@ def main() -> None:
 
 def with_diffuse_share_of(sky, other):
     """The same total light on the level, split into beam and diffuse as in another sky."""
-    changed = sky.copy()
+    changed = sky.copy(deep=True)
     total = open_sky_par(sky)
     share = other["diffuse_horizontal_umol_m2_s"].sum("band") / open_sky_par(other)
     own_diffuse = sky["diffuse_horizontal_umol_m2_s"].sum("band")

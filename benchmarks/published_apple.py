@@ -84,7 +84,7 @@ class Run:
         folder = self.folder / "structure" / reconstruction
         leaves = sorted(folder.glob("leaves_*.ply")) or [folder / "voxels.nc"]
         wood = self.folder / "structure/polygons/wood.ply"
-        return scene_files.read(leaves, wood, self.settings.ground_z_m)
+        return scene_files.read(leaves, wood, scene_files.around(self.settings.ground_z_m))
 
     def sky(
         self,
