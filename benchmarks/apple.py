@@ -27,6 +27,7 @@ from dapple.registration import shading
 from dapple.scene import traced
 from dapple.scene.surfaces import Scene, of_kinds
 from dapple.sky.open_sky import towards_sun
+from dapple.sky.solar_disc import SUN_DIAMETER_DEG
 from dapple.stats.measures import pearson
 from dapple.streams import stream_seed
 from dapple.virtual.leaves import along_wood
@@ -148,7 +149,9 @@ def traced_grid(run: Run, placing: dict, n_placements: int, fine: pd.DatetimeInd
         tracer = Tracer(Scene(of_kinds(leaf=leaves, wood=run.wood)), "llvm_ad_mono")
         for at, shift_m in enumerate(empty.shifts_m):
             moved = points_m - [*shift_m, 0.0]
-            seen = tracer.sun_visibility(moved, sun, n_disc=16, seed=number)
+            seen = tracer.sun_visibility(
+                moved, sun, n_disc=16, sun_diameter_deg=SUN_DIAMETER_DEG, seed=number
+            )
             sunlit[at] += seen / n_placements
             open_sky[at] += tracer.sky_visibility(moved, n=256, seed=number) / n_placements
     return Grid(
@@ -209,6 +212,7 @@ def whole_model(run: Run) -> pd.DataFrame:
             split_by="time",
             fit_share=0.999,
             gain="site",
+            sun_diameter_deg=settings.light.sun_diameter_deg,
             aperture_m=settings.light.entrance_m,
             response=COSINE,
             variant="llvm_ad_mono",
