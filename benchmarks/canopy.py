@@ -64,10 +64,12 @@ def ratios(folder: Path, name: str) -> pd.DataFrame:
         )
         image = coefficients.images(
             found,
-            *spectra.of_shoots(*needles, plot.shoot_recollision if shoots else 0.0),
-            np.array(seen_by.at_centres(settings.images.bark_reflectance)),
-            ground,
-            np.array(seen_by.at_centres(plot.diffuse_share)),
+            coefficients.Combinations(
+                *spectra.of_shoots(*needles, plot.shoot_recollision if shoots else 0.0),
+                np.array(seen_by.at_centres(settings.images.bark_reflectance)),
+                ground,
+                np.array(seen_by.at_centres(plot.diffuse_share)),
+            ),
         )
         corner = {"left_m": observed.left_m, "top_m": observed.top_m}
         grid = corner | {"pixel_m": pixel_m, "shape": (n, n)}

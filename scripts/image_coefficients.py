@@ -6,11 +6,11 @@ from dapple.formats import json, rasters
 from dapple.frames import direction_from_angles
 from dapple.retrieval import coefficient_files as files
 from dapple.retrieval import image_paths, maps
-from dapple.retrieval.coefficients import Window, projection_error, remainder_bound
+from dapple.retrieval.coefficients import Combinations, Window, projection_error, remainder_bound
 from dapple.scene import scene_files, traced
 from dapple.workflow import options, peak_rss_mb, run
 
-BRIGHT = ([[0.47]], [[0.47]], [[0.3]], [[0.4]])
+BRIGHT = Combinations(0.47, 0.47, bark=0.3, soil=0.4, diffuse_share=0.1)
 """Leaf reflectance and transmittance, bark and soil for which errors are told in the facts."""
 
 
@@ -48,8 +48,8 @@ def main(snakemake):
         "paths_per_pixel": coefficients.n_paths,
         "kinds_of_paths": len(coefficients.orders),
         "longest_path": int(coefficients.orders.sum(axis=1, dtype=int).max()),
-        "projection_error_bright": projection_error(coefficients, *BRIGHT, 0.1).item(),
-        "remainder_bound_bright": remainder_bound(coefficients, *BRIGHT).item(),
+        "projection_error_bright": projection_error(coefficients, BRIGHT).item(),
+        "remainder_bound_bright": remainder_bound(coefficients, BRIGHT).item(),
         "seconds": seconds,
         "paths_per_s": window.n_pixels * coefficients.n_paths / seconds,
         "peak_rss_mb": peak_rss_mb(),

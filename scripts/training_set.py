@@ -7,8 +7,15 @@ import numpy as np
 from dapple.errors import InputError
 from dapple.formats import json, meshes, rasters, tables
 from dapple.optics.cameras import camera
-from dapple.retrieval import coefficient_files as coefficient_files
-from dapple.retrieval import coefficients, prosail, semiless, spectra, training_entries
+from dapple.retrieval import (
+    coefficient_files,
+    coefficients,
+    prosail,
+    semiless,
+    spectra,
+    training_entries,
+)
+from dapple.retrieval.coefficients import Combinations
 from dapple.workflow import options, run
 
 
@@ -56,9 +63,8 @@ def images(path, properties, model, bark, share):
         fitted = coefficient_files.read_semiless(path)
         return semiless.image_chunks(fitted, *leaf, properties.soil_reflectance), fitted.window
     traced = coefficient_files.read(path)
-    soil = properties.soil_reflectance
-    chunks = coefficients.image_chunks(traced, *leaf, np.atleast_2d(bark), soil, share)
-    return chunks, traced.window
+    all_of_it = Combinations(*leaf, bark, properties.soil_reflectance, share)
+    return coefficients.image_chunks(traced, all_of_it), traced.window
 
 
 def level_canopies(inputs, canopy, properties, origin_m, params):

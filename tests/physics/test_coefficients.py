@@ -11,7 +11,7 @@ from dapple.formats.meshes import Mesh
 from dapple.frames import direction_from_angles
 from dapple.light import brf
 from dapple.retrieval import coefficients, image_paths, rendered_images
-from dapple.retrieval.coefficients import Window
+from dapple.retrieval.coefficients import Combinations, Window
 from dapple.scene import traced
 from dapple.scene.scene_optics import Optics
 from dapple.scene.surfaces import Scene, of_kinds
@@ -50,7 +50,7 @@ def of_canopy():
 
 
 def image(traced_once, rho=0.0, tau=0.0, soil=0.0, sky=0.0, bark=0.0):
-    return coefficients.images(traced_once, *([x] for x in (rho, tau, bark, soil, sky)))[0]
+    return coefficients.images(traced_once, Combinations(rho, tau, bark, soil, sky))[0]
 
 
 def exact_mean(traced_once, rho, tau, soil, sky):
@@ -128,17 +128,15 @@ def test_pixels_differ_little_from_those_with_many_functions():
     usual = trace(canopy())
     for optics in ((0.05, 0.02, 0.3, 0.4), (0.37, 0.6, 0.1, 0.1), (0.6, 0.37, 0.5, 0.0)):
         difference = image(usual, *optics) - image(many, *optics)
-        told = coefficients.projection_error(
-            usual, *(np.array([[x]]) for x in (*optics[:2], 0.0, *optics[2:]))
-        )
+        told = coefficients.projection_error(usual, Combinations(*optics[:2], 0.0, *optics[2:]))
         assert np.sqrt((difference**2).mean()) < 4 * told.item() < 0.01
 
 
 def test_the_spread_of_the_independent_sets_tells_the_noise(of_canopy):
-    optics = tuple(np.array([[x]]) for x in (0.45, 0.4, 0.0, 0.3))
+    optics = Combinations(0.45, 0.4, 0.0, 0.3, 0.1)
     other = trace(canopy(), n_paths=64, seed=9)
     sets, others = (
-        np.einsum("scx,x->sc", one.cells, coefficients.spectral_columns(one, *optics, 0.1)[:, 0, 0])
+        np.einsum("scx,x->sc", one.cells, coefficients.spectral_columns(one, optics)[:, 0, 0])
         for one in (of_canopy, other)
     )
     pixels = np.bincount(WINDOW.cells(3.0)[0])
@@ -151,9 +149,10 @@ def test_the_spread_of_the_independent_sets_tells_the_noise(of_canopy):
 def test_chunks_make_up_the_image(of_canopy):
     rho, tau, soil = np.array([[0.1, 0.5], [0.3, 0.4]]), np.array([[0.1, 0.4]]), [[0.2, 0.3]]
     share = [0.3, 0.1]
-    chunks = coefficients.image_chunks(of_canopy, rho, tau, 0.0, soil, share, pixels_per_chunk=150)
+    both = Combinations(rho, tau, 0.0, soil, share)
+    chunks = coefficients.image_chunks(of_canopy, both, pixels_per_chunk=150)
     whole = np.concatenate([values for _, values in chunks])
-    one = coefficients.images(of_canopy, rho[1], tau[0], [0.0, 0.0], soil[0], share)
+    one = coefficients.images(of_canopy, Combinations(rho[1], tau[0], 0.0, soil[0], share))
     np.testing.assert_allclose(whole[:, 1].T.reshape(2, 20, 20), one, rtol=1e-5)
 
 
@@ -192,10 +191,11 @@ def test_direct_renders_agree(of_canopy):
     made = rendered_images.Renderer(canopy()).render(
         WINDOW, SUN, optics, share, n_paths=256, n_passes=4, seed=2
     )
-    ours = coefficients.images(
-        of_canopy, optics.reflectance["leaf"], optics.transmittance["leaf"],
+    surfaces = Combinations(
+        optics.reflectance["leaf"], optics.transmittance["leaf"],
         optics.reflectance["wood"], optics.reflectance["ground"], share,
     )  # fmt: skip
+    ours = coefficients.images(of_canopy, surfaces)
     error = made.passes.mean(axis=(2, 3)).std(axis=0, ddof=1) / 2
     difference = (made.image - ours).mean(axis=(1, 2))
     assert (np.abs(difference) < 4 * np.hypot(error, 1.5e-3)).all()

@@ -123,7 +123,9 @@ def test_the_fit_holds_for_its_own_leaf_structure_and_less_for_others():
     for n in (1.5, 2.5):
         rho, tau = leaf_spectra(np.array([560.0, 720.0, 840.0]), n=n)
         soil = np.array([0.1, 0.2, 0.3])
-        exact = coefficients.images(traced_once, rho, tau, np.zeros(3), soil, share)
+        exact = coefficients.images(
+            traced_once, coefficients.Combinations(rho, tau, 0.0, soil, share)
+        )
         fast = semiless.images(fitted, rho, tau, soil)
         error[n] = np.abs((fast - exact).mean(axis=(1, 2))).max()
     assert error[1.5] < 2e-3

@@ -17,6 +17,7 @@ from functools import cached_property
 from operator import itemgetter
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dapple.light.brf import SKY, SUN
 from dapple.retrieval.basis import projector
@@ -123,45 +124,60 @@ class Coefficients:
         )
 
 
-def images(
-    coefficients: Coefficients,
-    leaf_reflectance: np.ndarray,
-    leaf_transmittance: np.ndarray,
-    bark: np.ndarray,
-    soil: np.ndarray,
-    diffuse_share: np.ndarray,
-) -> np.ndarray:
+@dataclass(frozen=True)
+class Combinations:
+    """Leaves, surfaces and light of n combinations in b bands; a single row serves all.
+
+    Attributes
+    ----------
+    leaf_reflectance, leaf_transmittance, bark, soil : (n, b) float
+        0 to 1.
+    diffuse_share : (b,) float
+        Of the light on level ground that comes from the sky, not from the sun.
+    """
+
+    leaf_reflectance: ArrayLike
+    leaf_transmittance: ArrayLike
+    bark: ArrayLike
+    soil: ArrayLike
+    diffuse_share: ArrayLike
+
+    @property
+    def surfaces(self) -> tuple[np.ndarray, ...]:
+        """Leaf reflectance and transmittance, bark and soil, (n, b) each."""
+        properties = (self.leaf_reflectance, self.leaf_transmittance, self.bark, self.soil)
+        return np.broadcast_arrays(*(np.atleast_2d(np.asarray(x, float)) for x in properties))
+
+    @property
+    def optics(self) -> Optics:
+        """The surfaces as n * b bands."""
+        surfaces = [values.reshape(-1) for values in self.surfaces]
+        return Optics.of_tree(np.zeros(surfaces[0].size), *surfaces)
+
+
+def images(coefficients: Coefficients, combination: Combinations) -> np.ndarray:
     """One image of given leaves and surfaces.
 
     Parameters
     ----------
     coefficients : Coefficients
         Traced once.
-    leaf_reflectance, leaf_transmittance, bark, soil : (b,) float
-        In b bands, 0 to 1.
-    diffuse_share : (b,) float
-        Of the light on level ground that comes from the sky, not from the sun.
+    combination : Combinations
+        Of one row, or of (b,) values.
 
     Returns
     -------
     (b, rows, columns) float32
         Reflectance factor: the ratio to a level white Lambertian plate in the open.
     """
-    rho, tau, wood, ground = (
-        np.asarray(x)[None] for x in (leaf_reflectance, leaf_transmittance, bark, soil)
-    )
-    columns = spectral_columns(coefficients, rho, tau, wood, ground, diffuse_share)[:, 0]
+    columns = spectral_columns(coefficients, combination)[:, 0]
     values = coefficients.table @ columns
     return np.ascontiguousarray(values.T).reshape(-1, *coefficients.shape)
 
 
 def image_chunks(
     coefficients: Coefficients,
-    leaf_reflectance: np.ndarray,
-    leaf_transmittance: np.ndarray,
-    bark: np.ndarray,
-    soil: np.ndarray,
-    diffuse_share: np.ndarray,
+    combinations: Combinations,
     *,
     pixels_per_chunk: int = 4096,
 ) -> Iterator[tuple[slice, np.ndarray]]:
@@ -171,10 +187,8 @@ def image_chunks(
     ----------
     coefficients : Coefficients
         Traced once.
-    leaf_reflectance, leaf_transmittance, bark, soil : (n, b) float
-        Of n combinations in b bands; a single row serves all.
-    diffuse_share : (b,) float
-        As in `images`.
+    combinations : Combinations
+        n of them.
     pixels_per_chunk : int
         A chunk takes 4 bytes × pixels × combinations × bands of memory.
 
@@ -185,28 +199,16 @@ def image_chunks(
     values : (pixels, n, b) float32
         Their reflectance factors.
     """
-    weight = spectral_columns(
-        coefficients, leaf_reflectance, leaf_transmittance, bark, soil, diffuse_share
-    )
+    weight = spectral_columns(coefficients, combinations)
     flat = weight.reshape(len(weight), -1)
     for low in range(0, len(coefficients.table), pixels_per_chunk):
         rows = slice(low, min(low + pixels_per_chunk, len(coefficients.table)))
         yield rows, (coefficients.table[rows] @ flat).reshape(-1, *weight.shape[1:])
 
 
-def spectral_columns(
-    coefficients: Coefficients,
-    leaf_reflectance: np.ndarray,
-    leaf_transmittance: np.ndarray,
-    bark: np.ndarray,
-    soil: np.ndarray,
-    diffuse_share: np.ndarray,
-) -> np.ndarray:
-    """What each column of the table has to be multiplied with, (2 * r, n, b) float32.
-
-    Parameters are those of `image_chunks`.
-    """
-    shape, optics = _broadcast(leaf_reflectance, leaf_transmittance, bark, soil)
+def spectral_columns(coefficients: Coefficients, combinations: Combinations) -> np.ndarray:
+    """What each column of the table has to be multiplied with, (2 * r, n, b) float32."""
+    shape, optics = combinations.surfaces[0].shape, combinations.optics
     weight = np.empty((2, coefficients.values.shape[1], len(optics)), np.float32)
     for low in range(0, len(optics), COMBINATIONS_AT_ONCE):
         part = slice(low, low + COMBINATIONS_AT_ONCE)
@@ -216,32 +218,23 @@ def spectral_columns(
         for source in (SUN, SKY):
             weight[source, :, part] = coefficients.projectors[source] @ factor
     weight = weight.reshape(2, -1, *shape)
-    share = np.broadcast_to(np.asarray(diffuse_share, np.float32), shape)
+    share = np.broadcast_to(np.asarray(combinations.diffuse_share, np.float32), shape)
     weight[SUN] *= 1 - share
     weight[SKY] *= share
     return weight.reshape(-1, *shape)
 
 
-def projection_error(
-    coefficients: Coefficients,
-    leaf_reflectance: np.ndarray,
-    leaf_transmittance: np.ndarray,
-    bark: np.ndarray,
-    soil: np.ndarray,
-    diffuse_share: np.ndarray,
-) -> np.ndarray:
+def projection_error(coefficients: Coefficients, combinations: Combinations) -> np.ndarray:
     """Root mean square error of a pixel by the projection, were its paths independent draws.
-
-    Parameters are those of `image_chunks`.
 
     Returns
     -------
     (n, b) float64
         Reflectance factor. Leaves far from those for which the functions were made show here.
     """
-    shape, optics = _broadcast(leaf_reflectance, leaf_transmittance, bark, soil)
+    shape, optics = combinations.surfaces[0].shape, combinations.optics
     factor = coefficients.counters.spectral_factor(coefficients.orders, optics)
-    share = np.broadcast_to(diffuse_share, shape).reshape(-1)
+    share = np.broadcast_to(np.asarray(combinations.diffuse_share), shape).reshape(-1)
     square = np.zeros(len(optics))
     for source, part in ((SUN, 1 - share), (SKY, share)):
         left = factor - coefficients.values @ (coefficients.projectors[source] @ factor)
@@ -249,37 +242,18 @@ def projection_error(
     return np.sqrt(square / coefficients.n_paths).reshape(shape)
 
 
-def remainder_bound(
-    coefficients: Coefficients,
-    leaf_reflectance: np.ndarray,
-    leaf_transmittance: np.ndarray,
-    bark: np.ndarray,
-    soil: np.ndarray,
-) -> np.ndarray:
+def remainder_bound(coefficients: Coefficients, combinations: Combinations) -> np.ndarray:
     """Most that paths given up at `max_orders` could still have brought to the image's mean.
 
     A path that goes on meets at most a fully lit surface at every order, and each sends on at most
     the largest albedo A: a geometric tail A^max_orders / (1 - A), over the sun's cosine.
 
-    Parameters
-    ----------
-    coefficients : Coefficients
-        Traced once.
-    leaf_reflectance, leaf_transmittance, bark, soil : (..., b) float
-        As in `images`.
-
     Returns
     -------
-    (..., b) float64
+    (n, b) float64
         Reflectance factor.
     """
-    leaf = np.asarray(leaf_reflectance) + np.asarray(leaf_transmittance)
-    albedo = np.clip(np.maximum(np.maximum(leaf, bark), soil), 0.0, 1 - 1e-6)
+    rho, tau, bark, soil = combinations.surfaces
+    albedo = np.clip(np.maximum.reduce([rho + tau, bark, soil]), 0.0, 1 - 1e-6)
     tail = albedo**coefficients.max_orders / (1 - albedo)
     return coefficients.cut_weight * tail / coefficients.sun_cosine
-
-
-def _broadcast(*properties: np.ndarray) -> tuple[tuple[int, ...], Optics]:
-    """Shape (n, b) of properties that are broadcast against each other, and they as n * b bands."""
-    both = np.broadcast_arrays(*(np.atleast_2d(np.asarray(x, float)) for x in properties))
-    return both[0].shape, Optics.of_tree(np.zeros(both[0].size), *(x.reshape(-1) for x in both))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from dapple.retrieval.coefficients import Coefficients, Window, spectral_columns
+from dapple.retrieval.coefficients import Coefficients, Combinations, Window, spectral_columns
 
 
 @dataclass(frozen=True)
@@ -66,9 +66,9 @@ def together(parts: list[Means]) -> Means:
     )
 
 
-def of_coefficients(coefficients: Coefficients, *optics: np.ndarray) -> Means:
-    """Means of many combinations by collision orders; optics as in `image_chunks`."""
-    weight = spectral_columns(coefficients, *optics)
+def of_coefficients(coefficients: Coefficients, combinations: Combinations) -> Means:
+    """Means of many combinations by collision orders."""
+    weight = spectral_columns(coefficients, combinations)
     sets = np.einsum("scx,xnb->sncb", coefficients.cells, weight, optimize=True)
     sets = sets.astype(np.float64)
     pixels = np.bincount(coefficients.window.cells(coefficients.cell_m)[0])

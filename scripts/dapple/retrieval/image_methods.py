@@ -9,7 +9,7 @@ import pandas as pd
 
 from dapple.optics.cameras import Camera
 from dapple.retrieval import coefficients, comparison, semiless, spectra
-from dapple.retrieval.coefficients import Coefficients
+from dapple.retrieval.coefficients import Coefficients, Combinations
 from dapple.retrieval.comparison import Means
 from dapple.retrieval.rendered_images import Renderer
 from dapple.retrieval.semiless import Fitted
@@ -103,9 +103,7 @@ class FastImages:
         ground, traced = properties.soil_reflectance, self.traced
         chunks = semiless.image_chunks(self.fitted, *leaf, ground)
         return {
-            "collision_orders": comparison.of_coefficients(
-                traced, *leaf, self.bark, ground, self.diffuse_share
-            ),
+            "collision_orders": comparison.of_coefficients(traced, self._combinations(properties)),
             "semi_less": comparison.of_chunks(chunks, traced.window, traced.cell_m),
         }
 
@@ -116,7 +114,7 @@ class FastImages:
         found = {}
         for name, chunks in {
             "collision_orders": coefficients.image_chunks(
-                self.traced, *leaf, self.bark, ground, self.diffuse_share
+                self.traced, self._combinations(properties)
             ),
             "semi_less": semiless.image_chunks(self.fitted, *leaf, ground),
         }.items():
@@ -125,6 +123,10 @@ class FastImages:
                 pass
             found[name] = time.perf_counter() - started
         return found
+
+    def _combinations(self, properties: Spectra) -> Combinations:
+        leaf = properties.leaf_reflectance, properties.leaf_transmittance
+        return Combinations(*leaf, self.bark, properties.soil_reflectance, self.diffuse_share)
 
 
 def errors(

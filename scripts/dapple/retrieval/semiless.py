@@ -29,7 +29,7 @@ import numpy as np
 from dapple.light.brf import SKY, SUN
 from dapple.optics.leaf import leaf_spectra
 from dapple.retrieval import coefficients as collision
-from dapple.retrieval.coefficients import Coefficients, Window
+from dapple.retrieval.coefficients import Coefficients, Combinations, Window
 
 SOILS = (0.0, 0.2, 0.5, 0.8)
 """Reflectances of the reference soils; the first one is black."""
@@ -136,9 +136,10 @@ def fit(
     terms = np.empty((2, 4, degree + 1, len(coefficients.table)), np.float32)
     for source in (SUN, SKY):
         chunks = collision.image_chunks(
-            coefficients, *leaves, np.array(bark), ground, np.array([float(source == SKY)]),
+            coefficients,
+            Combinations(*leaves, bark, ground, diffuse_share=float(source == SKY)),
             pixels_per_chunk=pixels_per_chunk,
-        )  # fmt: skip
+        )
         for pixels, values in chunks:
             four = values.reshape(-1, n_levels, 4).astype(np.float64)
             for k, term in enumerate(solve(four, soils)):
