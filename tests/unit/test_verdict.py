@@ -121,6 +121,22 @@ def test_failures_that_signals_foretell_are_found_in_runs_that_were_not_fitted_t
     assert found["false_alarms"] <= 0.15
 
 
+def test_worlds_that_were_left_out_are_judged_by_what_is_usual_elsewhere():
+    runs = stress(USUAL)
+    assert fitting.validate(runs)["unseen_world"]["detection"] >= 0.85
+    # In one world a signal stands where nothing is wrong at a level that means failure elsewhere.
+    runs.loc[runs["seed"] == 2, "noise_share"] += MOVES[-1]
+    found = fitting.validate(runs)
+    assert found["unseen_world"]["false_alarms"] > 0.15
+
+
+def test_runs_of_one_level_that_fail_together_are_one_piece_of_evidence():
+    runs = fitting.prepared(stress(USUAL))
+    every = fitting.rates(runs, np.ones(len(runs), bool))
+    assert every["failed_levels"] == 2 * len(USUAL)
+    assert every["precision"] == pytest.approx(every["failures"] / len(runs))
+
+
 def test_trouble_of_a_kind_that_was_never_seen_is_found_by_a_signal_that_others_taught():
     draw = np.random.default_rng(4)
     runs = stress(USUAL | {"more holes": "unknown_share"})
@@ -209,6 +225,7 @@ def test_models_are_stored_with_their_rates_and_judge_as_before(tmp_path, models
     assert set(stored["scan"]["rates"]) == {
         "halves",
         "unseen_stressor",
+        "unseen_world",
         "by_reconstruction",
         "by_stressor",
     }

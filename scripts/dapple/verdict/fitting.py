@@ -228,9 +228,11 @@ def rates(runs: pd.DataFrame, alarm: np.ndarray) -> dict[str, float]:
     Returns
     -------
     dict
-        `runs`, `failures`, `detection`, `false_alarms`; `detection_traced` is among the
-        `failures_traced`: those that ran, stressors without a trace in the scan (`TRACELESS`)
-        left out.
+        `runs`, `failures`, `detection`, `false_alarms`; `precision`, the share of flagged runs that
+        failed; `failed_levels`, how many levels of stressors failed, whatever the world and
+        reconstruction: runs of one level fail together and are no independent evidence.
+        `detection_traced` is among the `failures_traced`: those that ran, stressors without a trace
+        in the scan (`TRACELESS`) left out.
     """
     failed = runs["is_failure"].to_numpy(bool)
     traced = failed & runs["ran"].to_numpy(bool) & ~runs["stressor"].isin(TRACELESS).to_numpy()
@@ -243,6 +245,8 @@ def rates(runs: pd.DataFrame, alarm: np.ndarray) -> dict[str, float]:
         "failures": int(failed.sum()),
         "detection": share(failed),
         "false_alarms": share(~failed),
+        "precision": float(failed[alarm].mean()) if alarm.any() else math.nan,
+        "failed_levels": len(runs.loc[failed, ["stressor", "level"]].drop_duplicates()),
         "failures_traced": int(traced.sum()),
         "detection_traced": share(traced),
     }
@@ -251,7 +255,7 @@ def rates(runs: pd.DataFrame, alarm: np.ndarray) -> dict[str, float]:
 def validate(
     points: pd.DataFrame, *, seed: int = 0, with_records: bool = False, **settings: Any
 ) -> dict[str, dict]:
-    """Fit on a half, judge the other, both ways; and leave out one stressor after the other.
+    """Fit on a half, judge the other, both ways; leave out each stressor, and each world.
 
     Parameters
     ----------
@@ -265,21 +269,31 @@ def validate(
     Returns
     -------
     dict
-        `halves` and `unseen_stressor`, each as `rates` gives them: a stressor left out is judged by
-        models that never saw trouble of its kind. `by_reconstruction` and `by_stressor` part the
-        halves.
+        `halves`, `unseen_stressor` and `unseen_world`, each as `rates` gives them: what is left out
+        is judged by models that never saw trouble of its kind, or another tree and scan.
+        `by_reconstruction` and `by_stressor` part the halves.
     """
     runs = prepared(points)
-    undisturbed = runs[runs["harmless"].astype(bool)]
-    settings |= {"with_records": with_records, "undisturbed": undisturbed}
-    halves = cross_flagged(runs, seed=seed, **settings)
-    unseen = np.zeros(len(runs), bool)
-    for stressor in runs["stressor"].unique():
-        own = (runs["stressor"] == stressor).to_numpy()
-        unseen[own] = flagged(runs[own], fit(runs[~own], **settings))
-    found: dict[str, Any] = {"halves": rates(runs, halves), "unseen_stressor": rates(runs, unseen)}
+    settings |= {"with_records": with_records}
+    everywhere = {"undisturbed": runs[runs["harmless"].astype(bool)]} | settings
+    halves = cross_flagged(runs, seed=seed, **everywhere)
+    found: dict[str, Any] = {
+        "halves": rates(runs, halves),
+        "unseen_stressor": rates(runs, _left_out_flagged(runs, "stressor", **everywhere)),
+        # What is usual is told by the other worlds, too: a user's tree is not among them.
+        "unseen_world": rates(runs, _left_out_flagged(runs, "seed", **settings)),
+    }
     for column in ("reconstruction", "stressor"):
         found[f"by_{column}"] = {
             str(key): rates(rows, halves[rows.index]) for key, rows in runs.groupby(column)
         }
     return found
+
+
+def _left_out_flagged(runs: pd.DataFrame, column: str, **settings: Any) -> np.ndarray:
+    """(n,) bool: runs of each value of a column, judged by models fitted to all other runs."""
+    alarm = np.zeros(len(runs), bool)
+    for value in runs[column].unique():
+        own = (runs[column] == value).to_numpy()
+        alarm[own] = flagged(runs[own], fit(runs[~own], **settings))
+    return alarm
