@@ -12,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
+import stability_tables
 
 DATA = Path(__file__).parents[1] / "docs" / "data"
 
@@ -48,6 +49,7 @@ RUNS: dict[str, Callable[[Path], dict[str, pd.DataFrame]]] = {
     "survey-small": survey_small,
     "virtual-apple": virtual_apple,
     "apple": apple,
+    "stability": stability_tables.tables,
 }
 
 
