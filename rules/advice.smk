@@ -86,30 +86,6 @@ if LIT:
         script:
             "../scripts/advice.py"
 
-    rule advice_figure:
-        input:
-            advice=results("advice.yaml"),
-            code=code("advice_figure"),
-        output:
-            figure=report(
-                results("figures/advice.png"),
-                caption="../docs/captions/advice.rst",
-                category="Light",
-            ),
-        log:
-            logs("advice_figure"),
-        benchmark:
-            benchmarks("advice_figure")
-        conda:
-            "../envs/dapple.yaml"
-        threads: 1
-        resources:
-            mem_mb=500,
-        message:
-            said("picture of the advice")
-        script:
-            "../scripts/advice_figure.py"
-
     rule tradeoff_points:
         input:
             **sized(settings.tradeoff),
@@ -142,21 +118,16 @@ if LIT:
         script:
             "../scripts/tradeoff_points.py"
 
-    rule tradeoff_chart:
+    rule tradeoff_page:
         input:
             points=results("tradeoff/points.csv"),
-            code=code("tradeoff_chart"),
+            code=code("tradeoff_page"),
         output:
-            chart=report(
-                results("tradeoff/chart.png"),
-                caption="../docs/captions/tradeoff.rst",
-                category="Light",
-            ),
             page=results("tradeoff/chart.html"),
         log:
-            logs("tradeoff_chart"),
+            logs("tradeoff_page"),
         benchmark:
-            benchmarks("tradeoff_chart")
+            benchmarks("tradeoff_page")
         conda:
             "../envs/dapple.yaml"
         threads: 1
@@ -167,7 +138,7 @@ if LIT:
         message:
             said("accuracy against speed")
         script:
-            "../scripts/tradeoff_chart.py"
+            "../scripts/tradeoff_page.py"
 
     rule tradeoff:
         input:

@@ -116,11 +116,6 @@ def beside_code(path):
     return local(short(SCRIPTS / "dapple" / path))
 
 
-def caption(name):
-    """What a report says below a figure or table."""
-    return local(short(HOME / f"docs/captions/{name}.rst"))
-
-
 def data(path):
     """A file of real data, which the configuration names relative to data_dir."""
     file = Path(settings.data_dir) / path

@@ -7,140 +7,140 @@ Makes   figures/tree.png          the tree from the side and from above, with th
         figures/boxplot.png       correlation of every sensor by reconstruction
         figures/scatter.png       simulated against measured PAR
         figures/ground_map.png    PAR on the ground at four times
+        figures/advice.png        what refinements of the light change and cost
+        tradeoff/chart.png        accuracy against speed
         report.html               one self-contained page
 """
 
-# Figures of the page, in its order: the name of the caption, and where a plain run makes it.
+# Figures of the page, in its order. Each has a module in scripts/dapple/figures/, whose
+# of_run(inputs, options) reads the files that are named here and draws.
 FIGURES = {
-    "figures/tree.png": ("tree", LIT),
-    "figures/series.png": ("series", LIT),
-    "figures/boxplot.png": ("boxplot", COMPARED),
-    "figures/scatter.png": ("scatter", COMPARED),
-    "figures/ground_map.png": ("ground_map", LIT),
-    "figures/advice.png": ("advice", False),
-    "tradeoff/chart.png": ("tradeoff", False),
+    "tree": {
+        "path": "figures/tree.png",
+        "drawn_by": "tree",
+        "category": "Structure",
+        "caption": "The reconstructed tree from the side and from above. Green: leaf polygons; "
+        "brown: wood polygons; points: PAR sensors.",
+        "inputs": {
+            "leaves": leaf_meshes("polygons")[0],
+            "wood": results("structure/polygons/wood.ply"),
+            "sensors": results("sky/sensors.csv"),
+        },
+        "is_usual": bool(LIT),
+    },
+    "series": {
+        "path": "figures/series.png",
+        "drawn_by": "daily_courses",
+        "category": "Light",
+        "caption": "Photosynthetically active radiation through the day: measured (points) and "
+        "simulated with each reconstruction (lines), at sensors from the worst to the best "
+        "correlation.",
+        "inputs": {
+            "light": [results(f"light/{name}.nc") for name in LIT],
+            "records": results("statistics/records.csv") if COMPARED else [],
+        },
+        "options": {
+            "sensors": settings.figures.sensors,
+            "reconstructions": LIT,
+            "timezone": settings.site.timezone,
+        },
+        "is_usual": bool(LIT),
+    },
+    "boxplot": {
+        "path": "figures/boxplot.png",
+        "drawn_by": "boxplot",
+        "category": "Statistics",
+        "caption": "Pearson's r of each sensor's series, by reconstruction.",
+        "inputs": {
+            "per_sensor": results("statistics/per_sensor.csv"),
+            "overall": results("statistics/overall.csv"),
+        },
+        "is_usual": bool(COMPARED),
+    },
+    "scatter": {
+        "path": "figures/scatter.png",
+        "drawn_by": "scatter",
+        "category": "Statistics",
+        "caption": "Simulated against measured PAR, all sensors and times that no fit has seen; "
+        "the line is 1:1.",
+        "inputs": {
+            "records": results("statistics/records.csv"),
+            "overall": results("statistics/overall.csv"),
+        },
+        "is_usual": bool(COMPARED),
+    },
+    "ground_map": {
+        "path": "figures/ground_map.png",
+        "drawn_by": "ground_map",
+        "category": "Light",
+        "caption": "PAR on the ground around the stem at four times, one placement of the leaves.",
+        "inputs": {
+            "map": results("light/ground_map.nc"),
+            "wood": results("structure/polygons/wood.ply"),
+        },
+        "is_usual": bool(LIT),
+    },
+    "advice": {
+        "path": "figures/advice.png",
+        "drawn_by": "effects_chart",
+        "category": "Light",
+        "caption": "What each refinement of the light changes (share of open-sky PAR) and costs, "
+        "one at a time against the finest, on a pilot of sensors and times; in blue what the "
+        "advised model leaves out.",
+        "inputs": {"advice": results("advice.yaml")},
+        "is_usual": False,
+    },
+    "tradeoff": {
+        "path": "tradeoff/chart.png",
+        "drawn_by": "pareto_chart",
+        "category": "Light",
+        "caption": "Accuracy against speed of every setting that was tried: error against the "
+        "truth (or the finest polygons), and error of the rays, sky patches and scattering "
+        "orders alone, over the wall time of this very run.",
+        "inputs": {"points": results("tradeoff/points.csv")},
+        "is_usual": False,
+    },
 }
 
 
-rule tree_figure:
-    input:
-        leaves=leaf_meshes("polygons")[0],
-        wood=results("structure/polygons/wood.ply"),
-        sensors=results("sky/sensors.csv"),
-        code=code("tree_figure"),
-    output:
-        figure=report(
-            results("figures/tree.png"),
-            caption="../docs/captions/tree.rst",
-            category="Structure",
-        ),
-    log:
-        logs("tree_figure"),
-    benchmark:
-        benchmarks("tree_figure")
-    conda:
-        "../envs/dapple.yaml"
-    threads: 1
-    resources:
-        mem_mb=2000,
-    message:
-        said("picture of the tree")
-    script:
-        "../scripts/tree_figure.py"
+for figure, about in FIGURES.items():
 
-
-rule series_figure:
-    input:
-        light=[results(f"light/{name}.nc") for name in LIT],
-        records=results("statistics/records.csv") if COMPARED else [],
-        code=code("series_figure"),
-    output:
-        figure=report(
-            results("figures/series.png"),
-            caption="../docs/captions/series.rst",
-            category="Light",
-        ),
-    log:
-        logs("series_figure"),
-    benchmark:
-        benchmarks("series_figure")
-    conda:
-        "../envs/dapple.yaml"
-    threads: 1
-    resources:
-        mem_mb=1000,
-    params:
-        sensors=settings.figures.sensors,
-        reconstructions=LIT,
-        timezone=settings.site.timezone,
-    message:
-        said("PAR through the day")
-    script:
-        "../scripts/series_figure.py"
-
-
-rule comparison_figures:
-    input:
-        records=results("statistics/records.csv"),
-        overall=results("statistics/overall.csv"),
-        per_sensor=results("statistics/per_sensor.csv"),
-        code=code("comparison_figures"),
-    output:
-        boxplot=report(
-            results("figures/boxplot.png"),
-            caption="../docs/captions/boxplot.rst",
-            category="Statistics",
-        ),
-        scatter=report(
-            results("figures/scatter.png"),
-            caption="../docs/captions/scatter.rst",
-            category="Statistics",
-        ),
-    log:
-        logs("comparison_figures"),
-    benchmark:
-        benchmarks("comparison_figures")
-    conda:
-        "../envs/dapple.yaml"
-    threads: 1
-    resources:
-        mem_mb=1000,
-    message:
-        said("correlation by reconstruction")
-    script:
-        "../scripts/comparison_figures.py"
-
-
-rule ground_map_figure:
-    input:
-        map=results("light/ground_map.nc"),
-        wood=results("structure/polygons/wood.ply"),
-        code=code("ground_map_figure"),
-    output:
-        figure=report(
-            results("figures/ground_map.png"),
-            caption="../docs/captions/ground_map.rst",
-            category="Light",
-        ),
-    log:
-        logs("ground_map_figure"),
-    benchmark:
-        benchmarks("ground_map_figure")
-    conda:
-        "../envs/dapple.yaml"
-    threads: 1
-    resources:
-        mem_mb=1000,
-    message:
-        said("PAR on the ground")
-    script:
-        "../scripts/ground_map_figure.py"
+    rule:
+        name:
+            f"{figure}_figure"
+        input:
+            **about["inputs"],
+            code=code("figure")
+            + code(f"dapple/figures/{about['drawn_by']}")
+            + [beside_code(f"figures/{about['drawn_by']}.py")],
+        output:
+            figure=report(
+                results(about["path"]),
+                caption="../docs/captions/figure.rst",
+                category=about["category"],
+            ),
+        log:
+            logs(f"{figure}_figure"),
+        benchmark:
+            benchmarks(f"{figure}_figure")
+        conda:
+            "../envs/dapple.yaml"
+        threads: 1
+        resources:
+            mem_mb=2000,
+        params:
+            drawn_by=about["drawn_by"],
+            options=about.get("options", {}),
+            caption=about["caption"],
+        message:
+            said(f"figure {figure}")
+        script:
+            "../scripts/figure.py"
 
 
 rule page:
     input:
         made=[path for path in targets() if not path.endswith("report.html")],
-        captions=[caption(name) for name, _ in FIGURES.values()],
         code=code("page"),
     output:
         page=results("report.html"),
@@ -155,7 +155,7 @@ rule page:
         mem_mb=500,
     params:
         experiment=settings.experiment,
-        figures=list(FIGURES),
+        captions={about["path"]: about["caption"] for about in FIGURES.values()},
     message:
         said("report.html")
     script:

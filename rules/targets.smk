@@ -22,7 +22,7 @@ def light_targets():
     if COMPARED:
         wanted += ["statistics/overall.csv", "statistics/per_sensor.csv"]
         wanted += ["statistics/mixed_model.csv"]
-    wanted += [figure for figure, (_, is_made) in FIGURES.items() if is_made]
+    wanted += [about["path"] for about in FIGURES.values() if about["is_usual"]]
     return [*wanted, "verdict.json", "runtime.csv", "report.html"]
 
 

@@ -9,10 +9,10 @@ from dapple.workflow import run
 
 def main(snakemake):
     params, folder = snakemake.params, Path(snakemake.output.page).parent
-    texts = [" ".join(Path(path).read_text("utf-8").split()) for path in snakemake.input.captions]
-    captions = dict(zip(params.figures, texts, strict=True))
     with atomic(snakemake.output.page) as partial:
-        partial.write_text(report.build(params.experiment, folder, captions), encoding="utf-8")
+        partial.write_text(
+            report.build(params.experiment, folder, params.captions), encoding="utf-8"
+        )
 
 
 if __name__ == "__main__":

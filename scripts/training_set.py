@@ -7,15 +7,8 @@ import numpy as np
 from dapple.errors import InputError
 from dapple.formats import json, meshes, rasters, tables
 from dapple.optics.cameras import camera
-from dapple.retrieval import (
-    coefficient_files,
-    coefficients,
-    prosail,
-    semiless,
-    spectra,
-    training_entries,
-)
-from dapple.retrieval.coefficients import Combinations
+from dapple.retrieval import coefficient_files as files
+from dapple.retrieval import coefficients, prosail, semiless, spectra, training_entries
 from dapple.workflow import options, run
 
 
@@ -60,10 +53,10 @@ def images(path, properties, model, bark, share):
     """Chunks of pixels of images by three-dimensional transport, and their grid."""
     leaf = (properties.leaf_reflectance, properties.leaf_transmittance)
     if model == "semi_less":
-        fitted = coefficient_files.read_semiless(path)
+        fitted = files.read_semiless(path)
         return semiless.image_chunks(fitted, *leaf, properties.soil_reflectance), fitted.window
-    traced = coefficient_files.read(path)
-    all_of_it = Combinations(*leaf, bark, properties.soil_reflectance, share)
+    traced = files.read(path)
+    all_of_it = coefficients.Combinations(*leaf, bark, properties.soil_reflectance, share)
     return coefficients.image_chunks(traced, all_of_it), traced.window
 
 

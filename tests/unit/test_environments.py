@@ -31,7 +31,7 @@ PROGRAMS = {"pdal.py": "pdal", "cloud/cloudcompare.py": "cloudcompare"}
 OPTIONAL = {"cloudComPy"}
 """Used where it can be imported; on no registry."""
 RULE = re.compile(
-    r'^ *rule (\w+):.*?^ +conda:\s+"[^"]*?(\w+)\.yaml".*?^ +script:\s+"[^"]*?(\w+)\.py"',
+    r'^ *rule(?: (\w+))?:.*?^ +conda:\s+"[^"]*?(\w+)\.yaml".*?^ +script:\s+"[^"]*?(\w+)\.py"',
     re.DOTALL | re.MULTILINE,
 )
 
@@ -84,6 +84,11 @@ RULES = [
     for path in sorted((ROOT / "rules").rglob("*.smk"))
     for found in RULE.findall(path.read_text())
 ]
+# One rule draws all figures of the page, each by a module that its row names.
+FIGURES = [
+    ("figure", "dapple", f"dapple/figures/{name}")
+    for name in re.findall(r'"drawn_by": "(\w+)"', (ROOT / "rules/figures.smk").read_text())
+]
 ENVIRONMENTS = sorted(path.stem for path in (ROOT / "envs").glob("*.yaml"))
 
 
@@ -91,9 +96,10 @@ def test_every_rule_with_a_script_is_looked_at():
     text = "".join(path.read_text() for path in (ROOT / "rules").rglob("*.smk"))
     assert len(RULES) == len(re.findall(r"^ +script:", text, re.MULTILINE)) > 60
     assert len(RULES) == len(re.findall(r"^ +conda:", text, re.MULTILINE))
+    assert len(FIGURES) > 5
 
 
-@pytest.mark.parametrize(("rule", "name", "script"), RULES, ids=lambda value: value)
+@pytest.mark.parametrize(("rule", "name", "script"), RULES + FIGURES, ids=lambda value: value)
 def test_a_rule_s_environment_holds_what_its_script_imports(rule, name, script):
     missing = needs(SCRIPTS / f"{script}.py") - environment(name).keys()
     assert not missing, f"envs/{name}.yaml lacks {', '.join(sorted(missing))} for rule {rule}"
@@ -101,7 +107,7 @@ def test_a_rule_s_environment_holds_what_its_script_imports(rule, name, script):
 
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 def test_an_environment_holds_nothing_that_no_rule_needs(name):
-    scripts = {script for _, env, script in RULES if env == name}
+    scripts = {script for _, env, script in RULES + FIGURES if env == name}
     assert scripts, f"no rule names envs/{name}.yaml"
     needed = set().union(*(needs(SCRIPTS / f"{script}.py") for script in scripts))
     assert environment(name).keys() - needed <= {"pip", "drjit", "llvm-tools"}

@@ -14,7 +14,8 @@ from tests.workflow.project import SMALL, copy_of_project
 # What follows from what.
 PAGE = "runtime page"
 CONFIGURED = f"configuration {PAGE}"
-COMPARED = "records record_statistics comparison_figures series_figure verdict"
+FIGURES = "boxplot_figure scatter_figure"
+COMPARED = f"records record_statistics {FIGURES} series_figure verdict"
 
 
 def checked(n):
@@ -60,7 +61,7 @@ KEYS = {
     "light={timestep: {step_min: 120}}": "timesteps*4 reference*4 agreement",
     "light={sun_diameter_deg: 0.5}": SKY,
     "ground_z_m=-0.1": f"scan clean {CLASSES} sensors".replace(traced(3), traced(4)),
-    "statistics={confidence: 0.9}": "record_statistics comparison_figures",
+    "statistics={confidence: 0.9}": f"record_statistics {FIGURES}",
     "figures={map_spacing_m: 0.4}": MAP,
     "figures={sensors: [1_1]}": "series_figure",
     "survey={grown: 3}": "",
@@ -81,11 +82,11 @@ CODE = {
     "light/timestep.py": OWN_CHECK,
     "light/moved_sensors.py": "verdict",
     "registration/fit.py": "",  # nothing is fitted
-    "stats/correlation.R": "record_statistics comparison_figures",
+    "stats/correlation.R": f"record_statistics {FIGURES}",
     "stats/agreement.py": "agreement",
     "verdict/verdict_model.json": "verdict",
     "figures/tree.py": "tree_figure",
-    "figures/scatter.py": "comparison_figures",
+    "figures/scatter.py": "scatter_figure",
     "config/polygons.py": "",  # what it configures counts, not how it is read
     "survey/plan.py": "",
 }

@@ -1,11 +1,20 @@
 """Box plots of per-sensor r by reconstruction."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dapple.figures import style
+from dapple.formats import tables
+
+
+def of_run(inputs: Mapping[str, Any], options: Mapping[str, Any]) -> Figure:
+    """From the files of a run: `per_sensor`, `overall`."""
+    return draw(tables.read(inputs["per_sensor"]), tables.read(inputs["overall"]))
 
 
 @style.styled

@@ -1,6 +1,7 @@
 """Measured and simulated PAR through the day, one small panel per sensor."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import matplotlib.dates as mdates
 import numpy as np
@@ -10,6 +11,9 @@ from matplotlib.figure import Figure
 
 from dapple.errors import InputError
 from dapple.figures import style
+from dapple.formats import netcdf, tables
+from dapple.stats import measures
+from dapple.stats.pairs import simulated
 from dapple.timezones import find_timezone
 
 
@@ -34,6 +38,31 @@ def choose_sensors(per_sensor: pd.DataFrame, *, reconstruction: str, count: int 
     ranked = own.sort_values(["r", "sensor"])["sensor"].to_list()
     places = np.linspace(0, len(ranked) - 1, min(count, len(ranked))).round().astype(int)
     return [ranked[place] for place in places]
+
+
+def of_run(inputs: Mapping[str, Any], options: Mapping[str, Any]) -> Figure:
+    """From `records` of a run, or from its `light` where there are none.
+
+    Parameters
+    ----------
+    inputs : mapping
+        Paths.
+    options : mapping
+        `sensors` to draw (none: chosen by their correlation, or spread over the plan),
+        `reconstructions` of the light, `timezone` of the axis.
+    """
+    names, chosen = options["reconstructions"], list(options["sensors"])
+    if inputs["records"]:
+        records = tables.read(inputs["records"])
+        r = measures.per_sensor(records)
+        chosen = chosen or choose_sensors(r, reconstruction=names[0])
+    else:
+        light = zip(names, inputs["light"], strict=True)
+        parts = [simulated(netcdf.read(path), name) for name, path in light]
+        records, r = pd.concat(parts, ignore_index=True), None
+        labels = records["sensor"].unique()
+        chosen = chosen or list(labels[:: max(1, len(labels) // 6)][:6])
+    return draw(records, chosen, timezone=options["timezone"], per_sensor=r)
 
 
 @style.styled

@@ -1,5 +1,10 @@
 """What each refinement of the light changes and costs: one line for every coarser level."""
 
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
@@ -21,6 +26,11 @@ NAMES = {
 LEFT_OUT, KEPT, GEOMETRY = "#0072B2", "#D55E00", "#8C8C8C"
 SMALLEST = 1e-5
 """Effects below are drawn here."""
+
+
+def of_run(inputs: Mapping[str, Any], options: Mapping[str, Any]) -> Figure:
+    """From the files of a run: `advice`."""
+    return draw(yaml.safe_load(Path(inputs["advice"]).read_text()))
 
 
 @style.styled

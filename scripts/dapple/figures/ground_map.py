@@ -1,5 +1,8 @@
 """PAR on the ground under the tree at a few times."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 import pandas as pd
 import xarray as xr
@@ -7,6 +10,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dapple.figures import style
+from dapple.formats import meshes, netcdf
+from dapple.structure.stem import stem_position
+
+
+def of_run(inputs: Mapping[str, Any], options: Mapping[str, Any]) -> Figure:
+    """From the files of a run: `map` and `wood`, where the stem is."""
+    data = netcdf.read(inputs["map"])
+    sun = data[["sun_zenith_deg", "sun_azimuth_deg"]].to_dataframe()
+    stem = stem_position(meshes.read_ply(inputs["wood"]))
+    return draw(data["par_umol_m2_s"], stem_m=tuple(stem[:2]), sun=sun)
 
 
 @style.styled

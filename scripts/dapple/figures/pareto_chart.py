@@ -1,5 +1,6 @@
 """Accuracy against speed, as a picture and as a page that answers to the mouse."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from plotly.subplots import make_subplots
 
 from dapple.advice.tradeoff import PUBLISHED_S, front
 from dapple.figures import style
+from dapple.formats import tables
 
 MARKERS = {"transport": ("o", "circle"), "timestep": ("s", "square")}
 ENGINES = {"transport": "transport engine", "timestep": "per-timestep Mitsuba"}
@@ -67,6 +69,11 @@ def _cost_title(points: pd.DataFrame) -> str:
 
 ERRORS = ("error_rel", "error_finest_rel")
 ERROR_TITLE = "RMSE as a share of open-sky PAR"
+
+
+def of_run(inputs: Mapping[str, Any], options: Mapping[str, Any]) -> Figure:
+    """From the files of a run: `points` of the trade-off."""
+    return draw(tables.read(inputs["points"]))
 
 
 @style.styled

@@ -1,5 +1,8 @@
 """Simulated against measured PAR, every record, one panel per reconstruction."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -7,6 +10,13 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from dapple.figures import style
+from dapple.formats import tables
+
+
+def of_run(inputs: Mapping[str, Any], options: Mapping[str, Any]) -> Figure:
+    """From `records` of a run, those that no fit has seen, and `overall`."""
+    records = tables.read(inputs["records"])
+    return draw(records[records["part"] == "reporting"], tables.read(inputs["overall"]))
 
 
 @style.styled

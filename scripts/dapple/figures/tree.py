@@ -1,7 +1,8 @@
 """The reconstructed tree from the side and from above, with sensors and scan positions."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,7 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from dapple.figures import painter, style
+from dapple.formats import tables
 from dapple.formats.meshes import Mesh
+from dapple.scene import scene_files
 from dapple.scene.surfaces import Scene, Surface
 
 PANEL_IN = 4.0  # width of one view
@@ -34,6 +37,12 @@ class View:
 
 SIDE = View("from the south", 0, 2, 1, -1.0, ("east [m]", "up [m]"))
 ABOVE = View("from above", 0, 1, 2, 1.0, ("east [m]", "north [m]"))
+
+
+def of_run(inputs: Mapping[str, Any], options: Mapping[str, Any]) -> Figure:
+    """From the files of a run: `leaves`, `wood`, `sensors`."""
+    scene = scene_files.read([inputs["leaves"]], inputs["wood"])[0]
+    return draw(scene, sensors=tables.read(inputs["sensors"]))
 
 
 @style.styled

@@ -1,6 +1,6 @@
-"""Accuracy against speed: the chart of the trade-off as PNG and as HTML."""
+"""Accuracy against speed as a page to explore."""
 
-from dapple.figures import pareto_chart, style
+from dapple.figures import pareto_chart
 from dapple.formats import tables
 from dapple.formats.atomic import atomic
 from dapple.workflow import run
@@ -8,7 +8,6 @@ from dapple.workflow import run
 
 def main(snakemake):
     points = tables.read(snakemake.input.points)
-    style.save(pareto_chart.draw(points), snakemake.output.chart)
     title = f"{snakemake.params.experiment}: accuracy against speed"
     with atomic(snakemake.output.page) as partial:
         partial.write_text(pareto_chart.page(points, title), encoding="utf-8")
