@@ -24,10 +24,17 @@ CLEAR = (
     "%d.%m.%Y %H:%M:%S",
     "%d.%m.%y %H:%M",
     "%d.%m.%y %H:%M:%S",
+    "%d.%m.%Y %H.%M",
+    "%d.%m.%Y %H.%M.%S",
+    "%Y%m%d%H",
     "%d-%b-%Y %H:%M",
     "%d-%b-%Y %H:%M:%S",
     "%d %b %Y %H:%M",
     "%d %b %Y %H:%M:%S",
+    "%b %d %Y %H:%M",
+    "%b %d %Y %H:%M:%S",
+    "%d %B %Y %H:%M",
+    "%B %d %Y %H:%M",
 )
 CLOCKS = ("%H:%M", "%H:%M:%S", "%H:%M:%S.%f", "%I:%M %p", "%I:%M:%S %p")
 DAY_FIRST, MONTH_FIRST = (
@@ -71,6 +78,8 @@ def _declared(text: pd.Series, where: str, time_format: str) -> pd.DatetimeIndex
     if time_format in ("epoch", "excel"):
         numbers = pd.to_numeric(text, errors="coerce")
         unit, origin = ("s", "unix") if time_format == "epoch" else ("D", "1899-12-30")
+        if time_format == "epoch" and numbers.min() > 1e11:  # milliseconds
+            numbers = numbers / 1e3
         times = pd.to_datetime(numbers, unit=unit, origin=origin, errors="coerce")
         times = times.dt.round("s") if time_format == "excel" else times
     else:
@@ -98,6 +107,9 @@ def _first_of(formats: list[str], text: pd.Series) -> pd.Series | None:
     for one in formats:
         if one == ISO and not text.str.match(r"^\d{4}-\d{2}-\d{2}").all():
             continue  # "20230810" alone, or a number, is not meant
+        only_digits = re.fullmatch(r"(?:%[YmdHMS])+", one)
+        if only_digits and not text.str.fullmatch(rf"\d{{{len(one) + 2}}}").all():
+            continue  # their number tells the format: 2023081010 is no 01:00
         times = pd.to_datetime(text, format=one, errors="coerce")
         if times.notna().all() and times.dt.year.between(FIRST_YEAR, LAST_YEAR).all():
             return times
@@ -127,7 +139,7 @@ def _no_time(text: pd.Series, plain: pd.Series, where: str) -> InputError:
         number = float(text.iloc[0])
         hint = (
             "Set `time_format: epoch`."
-            if 9 <= len(text.iloc[0].split(".")[0]) <= 10
+            if len(text.iloc[0].split(".")[0]) in (9, 10, 12, 13)
             else "Set `time_format: excel`."
             if 20_000 < number < 60_000
             else "Seconds since 1970 have ten digits; write times in full, in ISO 8601."

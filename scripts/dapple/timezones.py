@@ -5,7 +5,7 @@ The standard library alone: Snakemake's own process reads this.
 
 import difflib
 import re
-from datetime import timedelta, timezone
+from datetime import datetime, timedelta, timezone
 from zoneinfo import ZoneInfo, available_timezones
 
 from dapple.errors import InputError
@@ -79,6 +79,13 @@ def find_timezone(name: str, where: str = "timezone") -> ZoneInfo | timezone:
         "an IANA name such as Europe/Berlin, or UTC, or an offset such as +02:00",
         remedy,
     )
+
+
+def is_same(one: str, other: str) -> bool:
+    """Whether two names of zones mean one offset in January and in July."""
+    zones = (find_timezone(one), find_timezone(other))
+    days = (datetime(2023, 1, 1), datetime(2023, 7, 1))
+    return len({tuple(zone.utcoffset(day) for day in days) for zone in zones}) == 1
 
 
 def note(name: str | None) -> str:

@@ -330,3 +330,17 @@ def test_leaves_that_sway_widen_the_entrance_of_a_sensor():
     disc = validate({"light": {"sway_m": 0.1}}).light.entrance_m / 2
     assert np.std(disc * radius * np.cos(angle)) == pytest.approx(0.1, rel=0.01)
     assert validate({"light": {"sway_m": 0.3, "aperture_m": 0.5}}).light.entrance_m == 1.3
+
+
+def test_a_switch_of_an_earlier_version_names_the_study():
+    plots = {"enabled": True, "plots": ["larch"]}
+    settings = validate({"study": "light", "chlorophyll": plots})
+    assert settings.study == "chlorophyll"
+    assert validate({"survey": {"enabled": False}}).study == "light"
+    with pytest.raises(InputError, match="one study in a run"):
+        validate({"survey": {"enabled": True}, "stability": {"enabled": True}})
+
+
+@pytest.mark.parametrize("name", ["Tree_7", "plot-utc+1", "v1.2"])
+def test_an_experiment_may_be_called_what_a_folder_may_be_called(name):
+    assert validate({"experiment": name}).experiment == name

@@ -1,11 +1,13 @@
 """Tables in the layouts that loggers, services and spreadsheets write."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from dapple.errors import InputError
-from dapple.formats import units, user_tables
+from dapple.formats import column_names, time_columns, units, user_tables
 from dapple.formats.user_tables import LIGHT_FLAGS
+from dapple.times import parse
 
 
 def written(tmp_path, text, name="table.csv", encoding="utf-8"):
@@ -52,7 +54,6 @@ def test_titles_comments_blank_lines_and_a_row_of_units_are_no_data(tmp_path):
         ("PK\x03\x04", "a spreadsheet"),
         ("1,2\n3,4\n", "no header"),
         ("a,b\n1,2\n3\n4,5\n", "line 3: found 1 cells"),
-        ("a,a\n1,2\n", "two columns called a"),
         ("a,b\n1,2,3\n1,2,3\n", "found 3 cells"),
     ],
 )
@@ -61,6 +62,68 @@ def test_what_is_no_table_is_refused_with_its_line(tmp_path, text, message):
         user_tables.read(written(tmp_path, text))
     with pytest.raises(InputError, match="no file"):
         user_tables.read(tmp_path / "none.csv")
+
+
+def test_a_name_that_is_there_twice_stops_only_who_asks_for_it(tmp_path):
+    table = user_tables.read(written(tmp_path, "time,light,temp,temp\n2023-08-10,5,20,21\n"))
+    assert table.numbers("light").values.tolist() == [5.0]
+    with pytest.raises(InputError, match="two columns called temp"):
+        table.numbers("temp")
+
+
+def test_a_header_may_stand_in_the_last_comment_and_empty_rows_are_passed_over(tmp_path):
+    text = "# STATION X\n# a;b\n1;2\n;\n3;4\n"
+    table = user_tables.read(written(tmp_path, text))
+    assert table.numbers("b").values.tolist() == [2.0, 4.0]
+
+
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
+def test_utf_16_is_known_without_its_mark(tmp_path, encoding):
+    table = user_tables.read(written(tmp_path, "time;light\n" + 9 * "x;5,5\n", encoding=encoding))
+    assert table.numbers("light").values.tolist() == 9 * [5.5]
+
+
+# --- names of columns -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["GHI", "ghi_wm2", "Global [W/m²]", "SlrW_Avg", "Globalstrahlung", "Radiación global",
+     "Rayonnement global (W/m2)", "Solar Rad. - W/m^2", "SW_IN", "Global Horizontal [W/m^2]"],
+)  # fmt: skip
+def test_global_radiation_is_found_by_what_people_call_it(name):
+    assert column_names.first(column_names.GLOBAL, ["T", "Wind (m/s)", name]) == name
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "zone"),
+    [
+        ("Zeit (MEZ),light", "10.08.2023 10:30,5", "MEZ"),
+        ("datetime_utc,light", "2023-08-10 10:30,5", "utc"),
+        ("Date,Time,light", "2023-08-10,10:30,5", None),
+        ("Datum,Uhrzeit,light", "10.08.2023,10:30:00,5", None),
+        ("Fecha,Hora,light", "2023/08/10,10:30,5", None),
+        ("DATE,MST,light", "2023-08-10,10:30,5", "MST"),
+        ("Date,Time,light", "20230810,1030,5", None),
+        ("Year,Month,Day,Hour,Minute,light", "2023,8,10,10,30,5", None),
+        ("YEAR,DOY,HHMM,light", "2023,222,1030,5", None),
+        ("year,jday,hour,light,minute", "2023,222,10,5,30", None),
+    ],
+)
+def test_times_may_stand_in_several_columns(tmp_path, header, row, zone):
+    table = user_tables.read(written(tmp_path, f"{header}\n{row}\n"))
+    times = time_columns.of(table, "", "time_column")
+    assert parse(times.text, "here", "UTC")[0] == pd.Timestamp("2023-08-10 10:30", tz="UTC")
+    assert times.zone == zone
+
+
+def test_columns_of_a_time_may_be_named_and_a_part_that_is_no_number_is_refused(tmp_path):
+    table = user_tables.read(written(tmp_path, "d,c,light\n2023-08-10,1030,5\n"))
+    times = time_columns.of(table, "d + c", "time_column")
+    assert times.text.tolist() == ["2023-08-10 10:30"]
+    table = user_tables.read(written(tmp_path, "year,doy,hhmm,light\n2023,x,1030,5\n"))
+    with pytest.raises(InputError, match="column 'doy', line 2: found 'x'"):
+        time_columns.of(table, "", "time_column")
 
 
 # --- numbers --------------------------------------------------------------------------------------
@@ -239,3 +302,32 @@ def test_fluxnet_stamps_mark_the_start(tmp_path):
     assert facts(table) == ("FLUXNET", None, "start", 30.0)
     assert table.known["par"] == "PPFD_IN"
     assert table.numbers("SW_IN", LIGHT_FLAGS).missing == {"-9999": 1}
+
+
+def test_cams_names_the_period_of_every_row(tmp_path):
+    row = "2023-08-10T10:{}:00.0/2023-08-10T10:{}:00.0;300;{};100\n"
+    text = "# Coding: utf-8\n# Observation period;TOA;GHI;DHI\n"
+    text += row.format("00", "15", 200) + row.format("15", "30", 210)
+    table = user_tables.read(written(tmp_path, text))
+    assert (table.layout, table.timezone) == ("CAMS", "UTC")
+    assert (table.interval_label, table.interval_min) == ("start", 15.0)
+    assert table.units["GHI"] == "Wh/m2"
+    assert table.text(table.known["time"]).iloc[0] == "2023-08-10T10:00:00.0"
+
+
+def test_solcast_stamps_the_end_of_its_period(tmp_path):
+    text = "Ghi,Dhi,PeriodEnd,PeriodStart,Period\n500,100,2023-08-10T10:30:00Z,x,PT30M\n"
+    table = user_tables.read(written(tmp_path, text))
+    assert (table.layout, table.interval_label, table.interval_min) == ("Solcast", "end", 30.0)
+    assert table.known == {"time": "PeriodEnd", "global": "Ghi", "diffuse": "Dhi"}
+
+
+def test_open_meteo_has_its_offset_in_the_second_line(tmp_path):
+    text = (
+        "latitude,longitude,elevation,utc_offset_seconds,timezone,timezone_abbreviation\n"
+        "48,7.8,230,7200,Europe/Berlin,CEST\n\n"
+        "time,shortwave_radiation (W/m²),diffuse_radiation (W/m²)\n2023-08-10T10:00,500,100\n"
+    )
+    table = user_tables.read(written(tmp_path, text))
+    assert (table.layout, table.timezone, table.interval_label) == ("Open-Meteo", "+02:00", "end")
+    assert table.numbers(table.known["global"]).values.tolist() == [500.0]

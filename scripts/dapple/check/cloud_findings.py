@@ -80,9 +80,10 @@ def up(facts: CloudFacts, settings: dict, path: str | Path) -> Iterator[Finding]
     """A tree stands along z: it is slender below and wide above."""
     if facts.ground.found_by == "ground class" or not is_a_plot(facts.cloud.xyz_m):
         return
-    slender = {axis: slenderness(selection.turned_up(facts.cloud, axis)) for axis in OTHER_AXES}
+    some = facts.cloud.select(slice(None, None, max(1, len(facts.cloud) // 50_000)))
+    slender = {axis: slenderness(selection.turned_up(some, axis)) for axis in OTHER_AXES}
     axis = min(slender, key=lambda one: slender[one])
-    if slender[axis] < SLENDER and slenderness(facts.cloud) > 2.5 * slender[axis]:
+    if slender[axis] < SLENDER and slenderness(some) > 2.5 * slender[axis]:
         yield findings.warning(
             path,
             f"a plant that is slender below and wide above with {OTHER_AXES[axis]}, not with z up",
@@ -94,12 +95,11 @@ def up(facts: CloudFacts, settings: dict, path: str | Path) -> Iterator[Finding]
 
 def slenderness(cloud: Cloud) -> float:
     """Ground plan of the part from a tenth to a third of the height, over that of all."""
-    some = cloud.select(slice(None, None, max(1, len(cloud) // 50_000)))
-    surface = ground_finder.find(some)
-    above = some.xyz_m[:, 2] - surface.height_m(some.xyz_m[:, :2])
+    surface = ground_finder.find(cloud)
+    above = cloud.xyz_m[:, 2] - surface.height_m(cloud.xyz_m[:, :2])
     top = float(np.quantile(above, 0.995))
-    cell = max(0.02 * float(np.ptp(some.xyz_m, axis=0).max()), 1e-6)
-    plan = np.floor(some.xyz_m[:, :2] / cell).astype(np.int64)
+    cell = max(0.02 * float(np.ptp(cloud.xyz_m, axis=0).max()), 1e-6)
+    plan = np.floor(cloud.xyz_m[:, :2] / cell).astype(np.int64)
     low = (above >= 0.1 * top) & (above < 0.33 * top)
     whole = len(np.unique(plan[above >= 0.1 * top], axis=0))
     return len(np.unique(plan[low], axis=0)) / whole if whole and low.any() else 1.0

@@ -14,6 +14,7 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "us-ft": 1200 / 3937}
 NOISE_CLASSES = (7, 18)
 """ASPRS: low and high noise."""
 
+_ODD = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
 NOISE = "classified as noise"
 FLAGS = {"Withheld": "withheld", "Synthetic": "synthetic"}
 KEPT = {*KNOWN_NAMES, "TrueClass"}
@@ -171,10 +172,15 @@ def storable(attributes: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], 
 
 def duplicates(xyz_m: np.ndarray) -> np.ndarray:
     """(n,) True for points at exactly the place of one before them."""
-    order = np.lexsort(xyz_m.T)
-    ordered = xyz_m[order]
+    # Points at one place have one key; the few with a key of another are compared in full.
+    parts = np.ascontiguousarray(xyz_m + 0.0).view(np.uint64)  # + 0.0: no -0.0
+    key = parts[:, 0] * _ODD[0] ^ parts[:, 1] * _ODD[1] ^ parts[:, 2] * _ODD[2]
+    ordered = np.sort(key)
+    shared = np.isin(key, np.unique(ordered[1:][ordered[1:] == ordered[:-1]]))
+    candidates = np.flatnonzero(shared)
+    order = candidates[np.lexsort(xyz_m[candidates].T)]
     again = np.zeros(len(xyz_m), bool)
-    again[order[1:]] = (ordered[1:] == ordered[:-1]).all(axis=1)
+    again[order[1:]] = (xyz_m[order[1:]] == xyz_m[order[:-1]]).all(axis=1)
     return again
 
 

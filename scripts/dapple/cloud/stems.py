@@ -21,6 +21,8 @@ MOST_CELLS = 20_000_000
 JOIN_M = 0.3
 """Pieces of one stem, seen from two sides, lie no farther apart."""
 LEAST_HEIGHT_M = 1.0
+AXIS_M = 1.0
+"""Within it of a stem, the highest point is the height of the tree."""
 COLUMNS = ("id", "x_m", "y_m", "z_m", "width_m", "height_m", "points")
 
 
@@ -80,6 +82,8 @@ def _table(plan, layer, number, n_layers: int, xyz_m, above, ground) -> pd.DataF
     rows = []
     order = np.argsort(number, kind="stable")
     starts = np.searchsorted(number[order], np.arange(1, number.max() + 2))
+    by_east = np.argsort(xyz_m[:, 0], kind="stable")
+    east = xyz_m[by_east, 0]
     for begin, end in pairwise(starts):
         own = order[begin:end]
         if len(np.unique(layer[own])) < FILLED * n_layers:
@@ -89,7 +93,8 @@ def _table(plan, layer, number, n_layers: int, xyz_m, above, ground) -> pd.DataF
         if width > WIDEST_M:
             continue
         place = 0.5 * (low + high)
-        near = np.abs(xyz_m[:, :2] - place).max(axis=1) < 1.0
+        near = by_east[slice(*np.searchsorted(east, place[0] + np.array([-AXIS_M, AXIS_M])))]
+        near = near[np.abs(xyz_m[near, 1] - place[1]) < AXIS_M]
         rows.append((*place, width, float(above[near].max()), len(own)))
     rows.sort()
     found = pd.DataFrame(rows, columns=["x_m", "y_m", "width_m", "height_m", "points"])

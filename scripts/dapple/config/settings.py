@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from annotated_types import Ge
 from pydantic import Field, ValidationError
 
-from dapple.config import checks
+from dapple.config import checks, old_keys
 from dapple.config.advice import Advice
 from dapple.config.base import Section, Some, key
 from dapple.config.chlorophyll import Chlorophyll
@@ -46,7 +46,7 @@ from dapple.config.voxels import Voxels
 class Settings(Section):
     """The whole configuration of a run."""
 
-    experiment: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]*$")] = key(
+    experiment: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_+.-]*$")] = key(
         "virtual-apple", "name of the run: results go to results/{experiment}"
     )
     study: Literal["light", "survey", "chlorophyll", "stability"] = key(
@@ -118,7 +118,7 @@ def validate(config: dict[str, Any], where: str = "configuration") -> Settings:
         of its range, or values that contradict each other.
     """
     try:
-        settings = Settings.model_validate(config)
+        settings = Settings.model_validate(old_keys.renewed(config, where))
     except ValidationError as error:
         raise explain(error, Settings, where) from None
     checks.check(settings, where)

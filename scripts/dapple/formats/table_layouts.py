@@ -1,7 +1,8 @@
 """Layouts of loggers and services that a table has by name: where the header is, what is fixed.
 
 Campbell TOA5 and TOACI1, Onset HOBO, DWD's ten-minute and hourly radiation, BSRN (PANGAEA's text
-and the station-to-archive file), NSRDB, PVGIS (hourly, typical year), FLUXNET.
+and the station-to-archive file), NSRDB, PVGIS (hourly, typical year), FLUXNET, CAMS, Solcast,
+Open-Meteo.
 """
 
 import re
@@ -10,9 +11,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from dapple.errors import InputError
+from dapple.formats import table_numbers
 from dapple.formats.text_table import Table, build
 
 JOINED_TIME = "time"
@@ -54,7 +57,9 @@ def _hobo(path: Path, lines: Sequence[str]) -> Table | None:
         return None
     delimiter = max(",;\t", key=lines[head].count)
     table = build(path, lines, header=head, delimiter=delimiter, layout="HOBO")
-    time = next(name for name in table.cells if re.match(r"Date[ -]Time", name))
+    time = next((name for name in table.cells if re.match(r"Date[ -]Time", name)), None)
+    if time is None:
+        return None
     offset = re.search(r"(?:GMT|UTC)\s*([+-]\d{1,2}:?\d{2})?", time)
     zone = (offset[1] or "UTC") if offset else None
     units: dict[str, str] = {}
@@ -139,15 +144,26 @@ def _nsrdb(path: Path, lines: Sequence[str]) -> Table | None:
         )
     year, month, day, hour, minute = (table.cells[name].str.zfill(2) for name in parts)
     time = year + "-" + month + "-" + day + " " + hour + ":" + minute
-    hours = float(facts.get("Time Zone", "0") or 0.0)
+    hours = table_numbers.plain(facts.get("Time Zone", "0") or "0")
+    if hours is None or abs(hours) > 14:
+        raise InputError(
+            f"{path}, line 2", f"the zone {facts['Time Zone']!r}", "hours east of Greenwich",
+            "Download the file again.",
+        )  # fmt: skip
     return replace(
         table,
         cells=table.cells.assign(**{JOINED_TIME: time}),
         units={"GHI": "W/m2", "DHI": "W/m2"},
-        timezone=f"{hours:+03.0f}:00" if hours % 1 == 0 else f"{int(hours):+03d}:30",
+        timezone=_offset(hours),
         interval_min=0.0,
         known=_there(table, **{"global": "GHI", "diffuse": "DHI"}) | {"time": JOINED_TIME},
     )
+
+
+def _offset(hours: float) -> str:
+    """5.5 as +05:30."""
+    whole, minutes = divmod(round(60 * abs(hours)), 60)
+    return f"{'-' if hours < 0 else '+'}{whole:02d}:{minutes:02d}"
 
 
 def _pvgis(path: Path, lines: Sequence[str]) -> Table | None:
@@ -211,6 +227,82 @@ def _fluxnet(path: Path, lines: Sequence[str]) -> Table | None:
     )
 
 
+def _cams(path: Path, lines: Sequence[str]) -> Table | None:
+    """CAMS radiation service: sums in Wh m⁻² over periods that each row names, UTC."""
+    head = next(
+        (k for k, line in enumerate(lines[:80]) if line.startswith("# Observation period;")), None
+    )
+    if head is None:
+        return None
+    table = build(path, lines, header=head, delimiter=";", layout="CAMS")
+    period = table.cells["Observation period"].str.split("/", expand=True)
+    if len(period.columns) != 2 or period.isna().any(axis=None):
+        raise InputError(path, "rows without a period", "CAMS's CSV", "Download it again.")
+    cells = table.cells.assign(**{JOINED_TIME: period[0]})
+    known = _there(table, **{"global": "GHI", "diffuse": "DHI"})
+    return replace(
+        table,
+        cells=cells,
+        units=dict.fromkeys(known.values(), "Wh/m2"),
+        timezone="UTC",
+        interval_label="start",
+        interval_min=_length_min(period[0], period[1]),
+        known=known | {"time": JOINED_TIME},
+    )
+
+
+def _length_min(start: pd.Series, end: pd.Series) -> float | None:
+    """Length of the first interval [min]."""
+    if not len(start):
+        return None
+    first, last = pd.to_datetime([start.iloc[0], end.iloc[0]], errors="coerce", utc=True)
+    # A period that ends with its last second or minute lasts until the next one begins.
+    minutes = (last - first).total_seconds() / 60.0
+    return float(np.ceil(minutes)) if np.isfinite(minutes) and minutes > 0 else None
+
+
+def _solcast(path: Path, lines: Sequence[str]) -> Table | None:
+    """Solcast: means over a period that is named by its end and its length, UTC."""
+    names = [re.sub(r"[^a-z]", "", name.lower()) for name in lines[0].split(",")]
+    if not {"periodend", "period"} <= set(names):
+        return None
+    table = build(path, lines, header=0, delimiter=",", layout="Solcast")
+    column = dict(zip(names, table.cells.columns, strict=False))
+    roles = {"time": "periodend", "global": "ghi", "diffuse": "dhi"}
+    known = {role: column[name] for role, name in roles.items() if name in column}
+    first = table.cells[column["period"]].iloc[0] if len(table.cells) else ""
+    length = re.fullmatch(r"PT(\d+)(M|H)", first)
+    return replace(
+        table,
+        units={name: "W/m2" for role, name in known.items() if role != "time"},
+        timezone="UTC",
+        interval_label="end",
+        interval_min=float(length[1]) * {"M": 1, "H": 60}[length[2]] if length else None,
+        known=known,
+    )
+
+
+def _open_meteo(path: Path, lines: Sequence[str]) -> Table | None:
+    """Open-Meteo: two lines of facts, then means over the hour (or quarter) before the stamp."""
+    if not lines[0].startswith("latitude,longitude,elevation,utc_offset_seconds") or len(lines) < 4:
+        return None
+    facts = dict(zip(lines[0].split(","), lines[1].split(","), strict=False))
+    head = next((k for k, line in enumerate(lines[2:], start=2) if line.startswith("time,")), None)
+    if head is None:
+        return None
+    table = build(path, lines, header=head, delimiter=",", layout="Open-Meteo")
+    seconds = table_numbers.plain(facts.get("utc_offset_seconds", "0")) or 0.0
+    roles = {"global": "shortwave_radiation", "diffuse": "diffuse_radiation"}
+    known = {role: column for role, name in roles.items() if (column := table.find([name]))}
+    is_known = abs(seconds) <= 14 * 3600
+    return replace(
+        table,
+        timezone=_offset(seconds / 3600) if is_known else None,
+        interval_label="end",
+        known=known | {"time": "time"},
+    )
+
+
 def _there(table: Table, **columns: str) -> dict[str, str]:
     """Those of a layout's columns that a file has."""
     return {role: name for role, name in columns.items() if name in table.cells}
@@ -225,4 +317,7 @@ LAYOUTS: tuple[Callable[[Path, Sequence[str]], Table | None], ...] = (
     _nsrdb,
     _pvgis,
     _fluxnet,
+    _cams,
+    _solcast,
+    _open_meteo,
 )

@@ -10,7 +10,9 @@ import pandas as pd
 from dapple.errors import InputError
 
 MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "missing", "-", "--", "---", "inf",
-                     "-inf", "#n/v", "#n/a", "?", "*"})  # fmt: skip
+                     "-inf", "#n/v", "#n/a", "#nv", "#value!", "#wert!", "#div/0!", "#ref!", "?",
+                     "*", "m", "/", "//", "///", "\\n", "–", "—", "n.a.", "nd", "n.d.", "k.a.",
+                     "nat", "no data", "nodata", "err", "error"})  # fmt: skip
 """Texts that stand for a missing value, in small letters."""
 
 # A sign, digits with separators, an exponent; then, perhaps, a unit.
@@ -118,7 +120,7 @@ def parse(
     """
     texts, codes = np.unique(cells.to_numpy().astype(str), return_inverse=True)
     words = MISSING | {str(flag).strip().lower() for flag in flags}
-    marks = [value for flag in flags if (value := _plain_number(str(flag))) is not None]
+    marks = [value for flag in flags if (value := plain(str(flag))) is not None]
     values = np.full(len(texts), np.nan)
     is_missing = np.zeros(len(texts), bool)
     units: dict[str, str] = {}
@@ -127,7 +129,7 @@ def parse(
             is_missing[k] = True
             continue
         match = NUMBER.match(_joined(text))
-        value = _plain_number(_with_point(match["number"], decimal)) if match else None
+        value = plain(_with_point(match["number"], decimal)) if match else None
         if match is None or value is None:
             line = cells.index[int(np.flatnonzero(codes == k)[0])]
             raise InputError(
@@ -183,7 +185,8 @@ def _with_point(number: str, decimal: str) -> str:
     return f"{whole}.{rest}{tail}" if rest or decimal in bare else f"{whole}{tail}"
 
 
-def _plain_number(text: str) -> float | None:
+def plain(text: str) -> float | None:
+    """The number that a text is, or None."""
     try:
         return float(text)
     except ValueError:

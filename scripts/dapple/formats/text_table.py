@@ -1,19 +1,21 @@
 """A table whose cells are text, and how lines of a file become one."""
 
 import csv
-import re
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from dapple.errors import InputError
-from dapple.formats import table_numbers
+from dapple.formats import column_names, table_numbers
+from dapple.formats.column_names import UNIT_IN_HEADER
 from dapple.formats.table_numbers import Numbers
 
-UNIT_IN_HEADER = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*$")
+MOST_NAMED = 4
+"""Of many usual names, messages list so many."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,8 @@ class Table:
         Columns that a layout fixes: `time`, `global`, `diffuse`, `par`, …
     decimal : str
         Decimal sign of the numbers: "." or ","; "": as the cells show.
+    repeated : frozenset of str
+        Names that several columns have: none of them can be asked for.
     """
 
     path: Path
@@ -50,13 +54,11 @@ class Table:
     interval_min: float | None = None
     known: dict[str, str] = field(default_factory=dict)
     decimal: str = ""
+    repeated: frozenset[str] = frozenset()
 
     def find(self, names: Sequence[str]) -> str | None:
-        """The first column with one of these names; capitals and a unit behind it do not matter."""
-        spelled = {_bare(column): column for column in reversed(self.cells.columns)}
-        exact = (name for name in names if name in self.cells)
-        loose = (spelled[_bare(name)] for name in names if _bare(name) in spelled)
-        return next(exact, None) or next(loose, None)
+        """The first column with one of these names, as `column_names.plain` spells both."""
+        return column_names.first(names, self.cells.columns)
 
     def require(self, names: Sequence[str], key: str) -> str:
         """As `find`, or an error that lists the columns and the configuration key.
@@ -71,12 +73,25 @@ class Table:
         raise InputError(
             self.path,
             f"columns {', '.join(self.cells.columns)}",
-            f"a column {' or '.join(names)}",
+            f"a column {' or '.join(names[:MOST_NAMED])}",
             f"Name the column in `{key}`.",
         )
 
     def text(self, column: str) -> pd.Series:
-        """A column as text."""
+        """A column as text.
+
+        Raises
+        ------
+        InputError
+            Several columns have this name.
+        """
+        if column in self.repeated:
+            raise InputError(
+                self.path,
+                f"two columns called {column}",
+                "each name that is used once",
+                "Rename one of them.",
+            )
         return self.cells[column]
 
     def numbers(self, column: str, flags: Collection[str | float] = ()) -> Numbers:
@@ -96,8 +111,27 @@ class Table:
         """
         where = f"{self.path}, column {column!r}"
         decimal = self.decimal or table_numbers.decimal_sign(self.cells, column, where)
-        found = table_numbers.parse(self.cells[column], where, decimal=decimal, flags=flags)
+        found = table_numbers.parse(self.text(column), where, decimal=decimal, flags=flags)
         return replace(found, unit=found.unit or self.units.get(column, ""))
+
+    def column(self, names: Sequence[str], key: str) -> np.ndarray:
+        """The numbers of a column that has one in every row.
+
+        Raises
+        ------
+        InputError
+            As `require` and `numbers`, or a row without one.
+        """
+        name = self.require(names, key)
+        values = self.numbers(name).values
+        if (empty := ~np.isfinite(values)).any():
+            raise InputError(
+                f"{self.path}, column {name!r}, line {self.cells.index[empty][0]}",
+                "no number",
+                "a number in each row",
+                "Complete the row or remove it.",
+            )
+        return values
 
 
 def build(
@@ -124,13 +158,15 @@ def build(
     **facts
         Further attributes of the table.
     """
-    names, in_header = _names(path, cells_of(lines[header], delimiter), header + 1)
+    names, in_header, repeated = _names(cells_of(lines[header].lstrip("# "), delimiter))
     first = header + 1 if first is None else first
     rows, numbers = [], []
     for number, line in enumerate(lines[first:], start=first + 1):
         if not line.strip() or line.lstrip().startswith("#"):
             continue
         row = cells_of(line, delimiter)
+        if not any(row):
+            continue
         while len(row) > len(names) and not row[-1]:
             row.pop()
         if len(row) != len(names):
@@ -139,7 +175,7 @@ def build(
         numbers.append(number)
     cells = pd.DataFrame(rows, columns=names, index=pd.Index(numbers, dtype=int), dtype=str)
     units = in_header | dict(facts.pop("units", {}))  # type: ignore[call-overload]
-    return Table(path, cells, units=units, **facts)  # type: ignore[arg-type]
+    return Table(path, cells, units=units, repeated=repeated, **facts)  # type: ignore[arg-type]
 
 
 def cells_of(line: str, delimiter: str) -> list[str]:
@@ -166,22 +202,19 @@ def trimmed(row: list[str]) -> list[str]:
     return row
 
 
-def _names(path: Path, row: list[str], line: int) -> tuple[list[str], dict[str, str]]:
-    """Names of the columns, and the units in brackets behind them."""
-    names = [name or f"column_{number}" for number, name in enumerate(trimmed(row), start=1)]
-    if repeated := [name for name, count in Counter(names).items() if count > 1]:
-        raise InputError(
-            f"{path}, line {line}",
-            f"two columns called {repeated[0]}",
-            "each name once",
-            "Rename one of them.",
-        )
+def _names(row: list[str]) -> tuple[list[str], dict[str, str], frozenset[str]]:
+    """Names of the columns, the units in brackets behind them, and names that are there twice.
+
+    The second of a name is called after its number, so that a table whose other columns are used
+    can be read.
+    """
+    named = [name or f"column_{number}" for number, name in enumerate(trimmed(row), start=1)]
+    repeated = frozenset(name for name, count in Counter(named).items() if count > 1)
+    names = [
+        name if name not in named[:k] else f"{name} (column {k + 1})"
+        for k, name in enumerate(named)
+    ]
     found = {name: UNIT_IN_HEADER.match(name) for name in names}
     in_header = {name: match["unit"].strip() for name, match in found.items() if match}
-    return names, {name: unit for name, unit in in_header.items() if not unit.isdigit()}
-
-
-def _bare(name: str) -> str:
-    """A name without its unit, in small letters."""
-    match = UNIT_IN_HEADER.match(name)
-    return (match["name"] if match else name).strip().lower()
+    units = {name: unit for name, unit in in_header.items() if not unit.isdigit()}
+    return names, units, repeated

@@ -1,5 +1,6 @@
 """Tables as loggers, weather services and people write them: read as text, then by column."""
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,8 +12,6 @@ from dapple.formats.text_table import Table, build, cells_of, trimmed, uneven
 from dapple.formats.units import is_unit
 
 DELIMITERS = ";\t,|"
-TIME_NAMES = ("time_utc", "time", "timestamp", "datetime", "date_time", "date time", "date/time")
-"""Usual names of the column of time stamps."""
 LIGHT_FLAGS = (-999.0, -9999.0, -99999.0, -6999.0, -7999.0, -888.0, 7999.0, 6999.0, 9999.0,
                99999.0)  # fmt: skip
 """Numbers by which loggers and services mark missing light: none is a light."""
@@ -50,16 +49,24 @@ def read_lines(path: Path) -> list[str]:
     data = path.read_bytes()
     if data[:2] == b"PK" or data[:4] == b"\xd0\xcf\x11\xe0":
         raise InputError(path, "a spreadsheet", "a text table", "Save it as CSV.")
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        text = data.decode("utf-16", errors="replace")
-    else:
-        try:
-            text = data.decode("utf-8-sig")
-        except UnicodeDecodeError:
-            text = data.decode("cp1252", errors="replace")
+    text = _decoded(data)
     if "\x00" in text:
         raise InputError(path, "a binary file", "a text table", "Export it as CSV.")
-    return text.splitlines()
+    return re.split(r"\r\n|\r|\n", text.removesuffix("\n"))
+
+
+def _decoded(data: bytes) -> str:
+    """UTF-8, UTF-16 with its mark or without, or Windows-1252."""
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return data.decode("utf-16", errors="replace")
+    for at, name in ((1, "utf-16-le"), (0, "utf-16-be")):
+        half = data[at:2000:2]
+        if len(half) > 20 and half.count(0) > 0.9 * len(half):
+            return data.decode(name, errors="replace")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", errors="replace")
 
 
 def counted(flags: dict[str, int]) -> str:
@@ -73,7 +80,10 @@ def _plain(path: Path, lines: Sequence[str]) -> Table:
     """Some lines, a header, perhaps a row of units, then values."""
     delimiter, header = _layout(path, lines)
     names = cells_of(lines[header], delimiter)
-    if all(table_numbers.is_number(name) for name in names if name):
+    if all(_is_value(name) for name in names if name):
+        commented = _commented(lines[:header], delimiter, len(names))
+        if commented is not None:
+            return build(path, lines, header=commented, delimiter=delimiter, first=header)
         before = [cells_of(line, delimiter) for line in lines[:header] if line.strip()]
         if before and len(before[-1]) > 1:
             raise uneven(path, header + 1, lines[header], len(names), len(before[-1]))
@@ -90,6 +100,21 @@ def _plain(path: Path, lines: Sequence[str]) -> Table:
         units = {name: unit for name, unit in zip(names, row, strict=False) if unit}
         first += 1
     return build(path, lines, header=header, delimiter=delimiter, first=first, units=units)
+
+
+def _is_value(cell: str) -> bool:
+    """Whether a cell is a number or a time, and so no name of a column."""
+    return table_numbers.is_number(cell) or bool(re.match(r"\d{4}-\d\d-\d\d|\d+[.:/]\d+", cell))
+
+
+def _commented(before: Sequence[str], delimiter: str, width: int) -> int | None:
+    """The last comment before the values that names all columns; None: there is none."""
+    found = [
+        index
+        for index, line in enumerate(before)
+        if line.startswith("#") and len(cells_of(line.lstrip("# "), delimiter)) == width
+    ]
+    return found[-1] if found else None
 
 
 def _layout(path: Path, lines: Sequence[str]) -> tuple[str, int]:

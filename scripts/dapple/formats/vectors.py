@@ -227,7 +227,8 @@ def _polygons(
     """Features that are polygons, mended where a ring crosses itself, in two dimensions."""
     noticed: list[Finding] = []
     shapes = shapely.force_2d(frame.geometry.to_numpy())
-    there = np.array([shape is not None and not shape.is_empty for shape in shapes])
+    # Corners that are no numbers (a broken file) belong to no shape.
+    there = np.isfinite(shapely.bounds(shapes)).all(axis=1)
     crossing = there & ~shapely.is_valid(shapes)
     shapes = np.array(
         [_only_polygons(shape) if ok else None for shape, ok in zip(shapes, there, strict=True)]

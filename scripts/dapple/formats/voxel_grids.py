@@ -1,5 +1,6 @@
 """Voxel grids of plant area density as xarray datasets: NetCDF and AMAPVox's text."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -134,13 +135,19 @@ def read_vox(path: str | Path) -> xr.Dataset:
             head |= dict(part.strip().split(":", 1) for part in line.split("#")[1:] if ":" in part)
     if first != "VOXEL SPACE" or not {"min_corner", "split", "res"} <= head.keys():
         raise InputError(path, f"`{first[:40]}` and keys {sorted(head)}", expected, _REMEDY)
-    corner, split, size = (_numbers(head[key]) for key in ("min_corner", "split", "res"))
-    table = pd.read_csv(path, sep=" ", skiprows=n_head)
-    shape = tuple(int(n) for n in split)
-    if not {"i", "j", "k", "PadBVTotal"} <= set(table) or len(table) != np.prod(shape):
+    try:
+        corner, split, size = (_numbers(head[key]) for key in ("min_corner", "split", "res"))
+        shape = tuple(int(n) for n in split)
+        table = pd.read_csv(path, sep=" ", skiprows=n_head, encoding_errors="replace")
+        index = table[["i", "j", "k"]].to_numpy(dtype=np.int64).T
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise InputError(path, " ".join(str(error).split())[:200], expected, _REMEDY) from error
+    if "PadBVTotal" not in table or len(table) != math.prod(shape):
         found = f"{len(table)} voxels with columns {', '.join(map(str, table.columns))}"
-        raise InputError(path, found, f"{np.prod(shape)} with i, j, k, PadBVTotal", _REMEDY)
-    at = np.ravel_multi_index(table[["i", "j", "k"]].to_numpy().T, shape)
+        raise InputError(path, found, f"{math.prod(shape)} with i, j, k, PadBVTotal", _REMEDY)
+    if len(np.unique(index, axis=1).T) != len(table) or not _inside(index, shape):
+        raise InputError(path, "voxels twice or outside the space", expected, _REMEDY)
+    at = np.ravel_multi_index(index, shape)
     data = {}
     for name in table.columns.difference(["i", "j", "k"]):
         values = np.empty(len(table), table[name].dtype)
@@ -151,6 +158,11 @@ def read_vox(path: str | Path) -> xr.Dataset:
     return xr.Dataset(data, coords, {"voxel_size_m": float(size[0]), "header": str(head)})
 
 
+def _inside(index: np.ndarray, shape: tuple[int, ...]) -> bool:
+    """Whether indices (3, n) are those of voxels."""
+    return bool(((index >= 0) & (index < np.array(shape)[:, None])).all())
+
+
 def _vector(values: np.ndarray) -> str:
     return f"({', '.join(f'{value:.10g}' for value in values)})"
 
@@ -158,4 +170,6 @@ def _vector(values: np.ndarray) -> str:
 def _numbers(text: str) -> np.ndarray:
     """Three numbers as AMAPVox writes them: in brackets or not, with commas or spaces, or one."""
     values = [float(word) for word in text.strip("()[]{} ").replace(",", " ").split()]
+    if len(values) not in (1, 3) or not np.isfinite(values).all():
+        raise ValueError(f"`{text.strip()}`, which are not three numbers")
     return np.array(values * 3 if len(values) == 1 else values)

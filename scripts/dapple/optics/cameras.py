@@ -119,19 +119,27 @@ def camera(rows: Sequence[tuple[str, float, float]], responses: str | Path = "")
     rows : sequence of (str, float, float)
         Name, centre and width [nm] of each band.
     responses : path or ""
-        CSV of response curves: `wavelength_nm` and a column of each band's name; bands that it
+        Table of response curves: `wavelength_nm` and a column of each band's name; bands that it
         does not name stay flat.
+
+    Raises
+    ------
+    InputError
+        No such file, no wavelengths, or cells of a band that are no numbers.
     """
     bands = tuple(Band(*row) for row in rows)
     if not responses:
         return Camera(bands)
     # Needs pandas, which the configuration, where bands have their defaults from, does without.
-    from dapple.formats import tables
+    from dapple.formats import user_tables
 
-    table = tables.read(responses).sort_values("wavelength_nm")
+    table = user_tables.read(responses)
+    wavelength = table.column(["wavelength_nm"], "the camera's responses")
+    order = wavelength.argsort()
     curves = {
-        name: tuple(zip(table["wavelength_nm"], table[name], strict=True))
-        for name in table.columns.intersection([band.name for band in bands])
+        band.name: tuple(zip(wavelength[order], table.column([band.name], "")[order], strict=True))
+        for band in bands
+        if table.find([band.name])
     }
     return Camera(
         tuple(Band(b.name, b.centre_nm, b.width_nm, curves.get(b.name, ())) for b in bands)

@@ -8,16 +8,28 @@ import pandas as pd
 from scipy.spatial import cKDTree
 
 from dapple.errors import InputError
-from dapple.formats import ground_surface, user_tables
+from dapple.formats import column_names, ground_surface, user_tables
 from dapple.formats.ground_surface import GroundSurface
 from dapple.formats.meshes import Mesh
 from dapple.scene.surfaces import GROUND, Surface
 
 COLUMN_NAMES = {
-    "sensor": ("sensor", "label"),
-    "x_m": ("x_m", "x", "east", "easting"),
-    "y_m": ("y_m", "y", "north", "northing"),
-    "z_m": ("z_m", "z", "up"),
+    "sensor": (*column_names.SENSOR, "name", "id", "point", "station"),
+    "x_m": ("x_m", "x", "east", "easting", "utm_x", "rechtswert", "coord_x", "x_coord"),
+    "y_m": ("y_m", "y", "north", "northing", "utm_y", "hochwert", "coord_y", "y_coord"),
+    "z_m": (
+        "z_m",
+        "z",
+        "up",
+        "height",
+        "height_m",
+        "elevation",
+        "altitude",
+        "hoehe",
+        "höhe",
+        "coord_z",
+        "z_coord",
+    ),
 }
 POSITION = ["x_m", "y_m", "z_m"]
 DEEPEST_M, LIFT_M = 0.15, 0.01

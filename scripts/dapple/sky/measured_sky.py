@@ -7,9 +7,10 @@ import numpy as np
 import pandas as pd
 
 from dapple.errors import InputError
+from dapple.formats import user_tables
 from dapple.frames import direction_from_angles
 from dapple.sky.patches import SUBDIVISIONS, patches
-from dapple.times import utc
+from dapple.times import parse, utc
 
 COLUMNS = ["zenith_deg", "azimuth_deg", "radiance"]
 
@@ -70,27 +71,22 @@ def read(path: str | Path) -> MeasuredSky:
     InputError
         Columns are missing, a radiance is negative or no number, or the sky has holes.
     """
-    table = pd.read_csv(path)
-    if missing := [name for name in COLUMNS if name not in table]:
+    table = user_tables.read(path)
+    zenith, azimuth, radiance = (table.column([name], "radiation.sky_table") for name in COLUMNS)
+    if (wrong := radiance < 0).any():
         raise InputError(
-            path, f"no {', '.join(missing)}", f"the columns {', '.join(COLUMNS)}", "Rename them."
-        )
-    values = table[COLUMNS].apply(pd.to_numeric, errors="coerce")
-    wrong = values.isna().any(axis=1) | (values["radiance"] < 0)
-    if wrong.any():
-        row = table.loc[wrong].iloc[0]
-        raise InputError(
-            path, f"a row {', '.join(map(str, row))}", "a direction and a radiance of 0 or more",
-            "Correct or remove it.",
+            f"{path}, line {table.cells.index[wrong][0]}", f"a radiance of {radiance[wrong][0]:g}",
+            "0 or more", "Correct or remove the row.",
         )  # fmt: skip
     times = None
-    moment = np.zeros(len(table), int)
-    if "time_utc" in table:
-        moment, found = pd.factorize(pd.to_datetime(table["time_utc"], utc=True), sort=True)
+    moment = np.zeros(len(radiance), int)
+    if column := table.find(["time_utc"]):
+        stamps = parse(table.text(column).rename("time_utc"), path)
+        moment, found = pd.factorize(stamps, sort=True)
         times = pd.DatetimeIndex(found)
-    direction = direction_from_angles(values["zenith_deg"], values["azimuth_deg"])
+    direction = direction_from_angles(zenith, azimuth)
     up = direction[:, 2] >= 0
-    direction, moment, radiance = direction[up], moment[up], values["radiance"].to_numpy()[up]
+    direction, moment, radiance = direction[up], moment[up], radiance[up]
     n_times = 1 if times is None else len(times)
     for n in sorted(SUBDIVISIONS, reverse=True)[:-1]:
         cell = moment * n + patches(n).index(direction)

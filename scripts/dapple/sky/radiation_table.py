@@ -10,13 +10,11 @@ import pandas as pd
 from dapple import findings, timezones
 from dapple.errors import InputError
 from dapple.findings import Finding
-from dapple.formats import units, user_tables
+from dapple.formats import column_names, time_columns, units, user_tables
 from dapple.formats.text_table import Table
-from dapple.formats.user_tables import LIGHT_FLAGS, TIME_NAMES
+from dapple.formats.user_tables import LIGHT_FLAGS
 from dapple.times import AHEAD, parse
 
-GLOBAL_NAMES = ("global_W_m2", "global", "ghi", "globalstrahlung")
-DIFFUSE_NAMES = ("diffuse_W_m2", "diffuse", "dhi", "diffusstrahlung")
 MAX_STEP_MIN = 180.0
 
 
@@ -112,12 +110,13 @@ def read(
         over an unknown interval, or nothing left.
     """
     source = user_tables.read(path, decimal=decimal)
-    zone = timezone or source.timezone
-    time_name = _column(source, time_column, "time", TIME_NAMES, "radiation.time_column")
-    index = parse(source.text(time_name), path, zone, time_format=time_format)
+    times = time_columns.of(source, time_column, "radiation.time_column")
+    stated = source.timezone or times.zone
+    zone = timezone or stated
+    index = parse(times.text, path, zone, time_format=time_format)
     names = {
         "global_w_m2": _column(
-            source, global_column, "global", GLOBAL_NAMES, "radiation.global_column"
+            source, global_column, "global", column_names.GLOBAL, "radiation.global_column"
         ),
         "diffuse_w_m2": _diffuse_column(source, diffuse_column),
     }
@@ -159,18 +158,16 @@ def read(
         noticed.append(
             findings.warning(path, f"the time zone {text}", "", "Declare the offset if it does.")
         )
-    if zone and timezone and source.timezone and zone != source.timezone:
+    if timezone and stated and not timezones.is_same(timezone, stated):
         noticed.append(
-            findings.warning(
-                path, f"the zone {source.timezone} in the file", f"{timezone}, as declared"
-            )
+            findings.warning(path, f"the zone {stated} in the file", f"{timezone}, as declared")
         )
     facts = {
         "path": str(path),
         "layout": source.layout,
-        "columns": {"time": time_name, **columns},
+        "columns": {"time": times.text.name, **columns},
         "units": {columns[kind]: name or "W/m2 (assumed)" for kind, name in used.items()},
-        "timezone": zone or ("UTC" if time_name.lower().endswith("_utc") else "in the file"),
+        "timezone": zone or "in the file",
         "interval_label": label,
         "interval_min": length_min,
         "rows": len(source.cells),
@@ -191,7 +188,7 @@ def _column(source: Table, name: str, role: str, usual: Sequence[str], key: str)
 def _diffuse_column(source: Table, name: str) -> str | None:
     if name:
         return source.require([name], "radiation.diffuse_column")
-    return source.known.get("diffuse") or source.find(DIFFUSE_NAMES)
+    return source.known.get("diffuse") or source.find(column_names.DIFFUSE)
 
 
 def _interval(

@@ -11,18 +11,16 @@ import pandas as pd
 from dapple import findings, timezones
 from dapple.errors import InputError
 from dapple.findings import Finding
-from dapple.formats import units, user_tables
+from dapple.formats import column_names, time_columns, units, user_tables
 from dapple.formats.table_numbers import Numbers
 from dapple.formats.text_table import Table
-from dapple.formats.user_tables import LIGHT_FLAGS, TIME_NAMES
+from dapple.formats.user_tables import LIGHT_FLAGS
 from dapple.times import AHEAD, parse
 
 MIN_PAR_UMOL_M2_S = -20.0  # offsets of a sensor in the dark
 MAX_PAR_UMOL_M2_S = 4000.0  # the sun outside the atmosphere gives about 2700
 COLUMNS = ["sensor", "time", "par_umol_m2_s"]
 INTERVAL = "interval_s"
-PAR_NAMES = ("par_umolm2s", "par_umol_m2_s", "par", "ppfd", "ppfd_in")
-SENSOR_NAMES = ("sensor", "label")
 
 
 @dataclass(frozen=True)
@@ -144,15 +142,10 @@ def _read_file(
     """One file: a row a record, missing ones NaN, with `label` and `length_min` of its interval."""
     time_column, sensor_column, par_column = columns
     source = user_tables.read(path, decimal=decimal)
-    zone = zone or source.timezone or ""
     long, numbers = _long(source, sensors, sensor_column, par_column, missing)
-    if time_column:
-        time_column = source.require([time_column], "measured.time_column")
-    else:
-        time_column = source.known.get("time") or source.require(TIME_NAMES, "measured.time_column")
-    stamps = parse(
-        source.text(time_column), path, zone, time_format=time_format, group=_groups(long, source)
-    )
+    times = time_columns.of(source, time_column, "measured.time_column")
+    zone = zone or source.timezone or times.zone or ""
+    stamps = parse(times.text, path, zone, time_format=time_format, group=_groups(long, source))
     long["time"] = pd.Series(stamps, index=source.cells.index).loc[long["line"]].to_numpy()
     noticed = _in_micromoles(long, source, numbers, unit, interval[1])
     label = interval[0] or source.interval_label or "instant"
@@ -169,7 +162,7 @@ def _read_file(
         "path": str(path),
         "layout": source.layout,
         "timezone": zone or "in the file",
-        "columns": [time_column, *numbers],
+        "columns": [times.text.name, *numbers],
         "interval_label": label,
         "missing": flags,
         "rows": len(long),
@@ -189,10 +182,10 @@ def _long(
     if sensor_column:
         sensor: str | None = source.require([sensor_column], "measured.sensor_column")
     else:
-        sensor = source.find(SENSOR_NAMES)
+        sensor = source.find(column_names.SENSOR)
     logger, channel = source.find(["logger"]), source.find(["channel"])
     if sensor or (logger and channel):
-        names = [par_column] if par_column else [*PAR_NAMES]
+        names = [par_column] if par_column else [*column_names.PAR]
         column = source.known.get("par") if not par_column else None
         column = column or source.require(names, "measured.par_column")
         labels = source.text(sensor) if sensor else _joined(source, logger, channel)
@@ -265,7 +258,7 @@ def _columns_of_sensors(
 
 def _is_par(source: Table, column: str) -> bool:
     unit = units.named(source.units.get(column, "")) or units.named(column)
-    return unit in units.PHOTONS or column.lower() in PAR_NAMES
+    return unit in units.PHOTONS or column_names.first(column_names.PAR, [column]) is not None
 
 
 def _is_of(name: str, label: str) -> bool:
