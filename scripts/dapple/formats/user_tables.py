@@ -3,7 +3,7 @@
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dapple.errors import InputError
@@ -15,6 +15,43 @@ DELIMITERS = ";\t,|"
 LIGHT_FLAGS = (-999.0, -9999.0, -99999.0, -6999.0, -7999.0, -888.0, 7999.0, 6999.0, 9999.0,
                99999.0)  # fmt: skip
 """Numbers by which loggers and services mark missing light: none is a light."""
+
+
+@dataclass(frozen=True)
+class Declared:
+    """What is declared of a table with times; empty: as the file says, or as its cells show.
+
+    Attributes
+    ----------
+    time_column : str
+        See `time_columns.of`.
+    timezone, time_format : str
+        See `times.parse`; a column that ends in `_utc`, and some layouts, need no zone.
+    interval_label : {"", "instant", "start", "middle", "end"}
+        What of its interval a stamp marks; empty: what the layout says, else a moment.
+    interval_min : float
+        Length of the intervals [min]; 0: the layout's, else the step between rows.
+    unit : str
+        Of the values; empty: as the header says, else the usual one.
+    decimal : {"", ".", ","}
+        Decimal sign.
+    missing : texts or numbers
+        Flags of missing values, besides `LIGHT_FLAGS`.
+    """
+
+    time_column: str = ""
+    timezone: str = ""
+    time_format: str = ""
+    interval_label: str = ""
+    interval_min: float = 0.0
+    unit: str = ""
+    decimal: str = ""
+    missing: Sequence[str | float] = ()
+
+    @property
+    def flags(self) -> tuple[str | float, ...]:
+        """All flags of missing values."""
+        return (*LIGHT_FLAGS, *self.missing)
 
 
 def read(path: str | Path, *, decimal: str = "") -> Table:

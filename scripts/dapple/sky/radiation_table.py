@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,7 +13,7 @@ from dapple.errors import InputError
 from dapple.findings import Finding
 from dapple.formats import column_names, time_columns, units, user_tables
 from dapple.formats.text_table import Table
-from dapple.formats.user_tables import LIGHT_FLAGS
+from dapple.formats.user_tables import Declared
 from dapple.times import AHEAD, parse
 
 MAX_STEP_MIN = 180.0
@@ -67,18 +68,7 @@ class Radiation:
 
 
 def read(
-    path: str | Path,
-    *,
-    time_column: str = "",
-    global_column: str = "",
-    diffuse_column: str = "",
-    timezone: str = "",
-    time_format: str = "",
-    interval_label: str = "",
-    interval_min: float = 0.0,
-    unit: str = "",
-    decimal: str = "",
-    missing: Sequence[str | float] = (),
+    path: str | Path, *, global_column: str = "", diffuse_column: str = "", **declared: Any
 ) -> Radiation:
     """Read measured broadband radiation.
 
@@ -86,22 +76,12 @@ def read(
     ----------
     path : path
         A text table in any layout of `dapple.formats.user_tables`.
-    time_column, global_column, diffuse_column : str
-        Times, global and diffuse irradiance on the horizontal; empty: found by the usual names or
-        the file's layout. Diffuse may be absent.
-    timezone, time_format : str
-        See `times.parse`; a column that ends in `_utc`, and some layouts, need no zone.
-    interval_label : {"", "instant", "start", "middle", "end"}
-        What a stamp marks; empty: what the layout says, else a moment.
-    interval_min : float
-        Length of the intervals [min]; 0: the layout's, else the step between rows.
-    unit : str
-        Of global and diffuse (`units.POWERS`, `units.ENERGIES`); empty: as the header says, else
-        W/m2.
-    decimal : {"", ".", ","}
-        Decimal sign; empty: as the cells show.
-    missing : texts or numbers
-        Flags of missing values, besides `LIGHT_FLAGS`.
+    global_column, diffuse_column : str
+        Global and diffuse irradiance on the horizontal; empty: found by the usual names or the
+        file's layout. Diffuse may be absent.
+    **declared
+        Fields of `user_tables.Declared`; `unit` is of both (`units.POWERS`, `units.ENERGIES`),
+        else W/m2.
 
     Raises
     ------
@@ -109,11 +89,12 @@ def read(
         No file or column, unreadable times, two values at one time, text that is no number, sums
         over an unknown interval, or nothing left.
     """
-    source = user_tables.read(path, decimal=decimal)
-    times = time_columns.of(source, time_column, "radiation.time_column")
+    said = Declared(**declared)
+    source = user_tables.read(path, decimal=said.decimal)
+    times = time_columns.of(source, said.time_column, "radiation.time_column")
     stated = source.timezone or times.zone
-    zone = timezone or stated
-    index = parse(times.text, path, zone, time_format=time_format)
+    zone = said.timezone or stated
+    index = parse(times.text, path, zone, time_format=said.time_format)
     names = {
         "global_w_m2": _column(
             source, global_column, "global", column_names.GLOBAL, "radiation.global_column"
@@ -121,9 +102,7 @@ def read(
         "diffuse_w_m2": _diffuse_column(source, diffuse_column),
     }
     columns = {kind: name for kind, name in names.items() if name}
-    numbers = {
-        kind: source.numbers(name, (*LIGHT_FLAGS, *missing)) for kind, name in columns.items()
-    }
+    numbers = {kind: source.numbers(name, said.flags) for kind, name in columns.items()}
     table = pd.DataFrame({kind: one.values for kind, one in numbers.items()}, index=index)
     dropped = {columns[kind]: one.missing for kind, one in numbers.items() if one.missing}
     table = table[table["global_w_m2"].notna()]
@@ -131,20 +110,22 @@ def read(
         raise InputError(path, "no row with a value", "radiation by time", "Is the file complete?")
     repeated = int(table.index.duplicated().sum())
     table = _unique(table, str(path)).sort_index()
-    label, length_min, is_declared = _interval(source, table, interval_label, interval_min)
+    label, length_min, is_declared = _interval(
+        source, table, said.interval_label, said.interval_min
+    )
     noticed, used = [], {}
     for kind, one in numbers.items():
         where = f"{path}, column {columns[kind]!r}"
         used[kind], doubt = units.of_column(
             one.unit,
             columns[kind],
-            unit,
+            said.unit,
             where=where,
             key="radiation.unit",
             known=units.IRRADIANCES,
         )
         noticed += doubt
-        step = length_min or interval_min or _step_min(table)
+        step = length_min or said.interval_min or _step_min(table)
         table[kind] *= units.irradiance_factor(used[kind] or "W/m2", step, where)
     noticed += [
         findings.note(
@@ -158,9 +139,11 @@ def read(
         noticed.append(
             findings.warning(path, f"the time zone {text}", "", "Declare the offset if it does.")
         )
-    if timezone and stated and not timezones.is_same(timezone, stated):
+    if said.timezone and stated and not timezones.is_same(said.timezone, stated):
         noticed.append(
-            findings.warning(path, f"the zone {stated} in the file", f"{timezone}, as declared")
+            findings.warning(
+                path, f"the zone {stated} in the file", f"{said.timezone}, as declared"
+            )
         )
     facts = {
         "path": str(path),

@@ -4,6 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -14,7 +15,7 @@ from dapple.findings import Finding
 from dapple.formats import column_names, time_columns, units, user_tables
 from dapple.formats.table_numbers import Numbers
 from dapple.formats.text_table import Table
-from dapple.formats.user_tables import LIGHT_FLAGS
+from dapple.formats.user_tables import Declared
 from dapple.times import AHEAD, parse
 
 MIN_PAR_UMOL_M2_S = -20.0  # offsets of a sensor in the dark
@@ -47,16 +48,9 @@ def read(
     path: str | Path | Sequence[str | Path],
     *,
     sensors: pd.DataFrame | None = None,
-    time_column: str = "",
     sensor_column: str = "",
     par_column: str = "",
-    timezone: str = "",
-    time_format: str = "",
-    interval_label: str = "",
-    interval_min: float = 0.0,
-    unit: str = "",
-    decimal: str = "",
-    missing: Sequence[str | float] = (),
+    **declared: Any,
 ) -> Records:
     """Read PAR records.
 
@@ -69,20 +63,12 @@ def read(
     sensors : pandas.DataFrame or None
         The sensor table. Every recorded sensor must be in it, columns and files of wide tables are
         known by its labels, and its column `calibration`, where there is one, multiplies records.
-    time_column, sensor_column, par_column : str
+    sensor_column, par_column : str
         Empty: found by the usual names or the file's layout. `par_column` of a wide table is a
         pattern such as `PAR_{sensor}_Avg`.
-    timezone, time_format : str
-        See `times.parse`.
-    interval_label : {"", "instant", "start", "middle", "end"}
-        What of its interval a stamp marks; empty: what the layout says, else a moment.
-    interval_min : float
-        Length of the intervals [min]; 0: the step between a sensor's records.
-    unit : str
-        Of the values (`units.PHOTONS`, `units.PHOTON_SUMS`); empty: as the header says, else
-        umol/m2/s.
-    decimal, missing
-        See `radiation_table.read`.
+    **declared
+        Fields of `user_tables.Declared`; `unit` is of the values (`units.PHOTONS`,
+        `units.PHOTON_SUMS`), else umol/m2/s.
 
     Raises
     ------
@@ -91,20 +77,8 @@ def read(
         sensor and time, impossible values, or sensors that the table does not know.
     """
     paths = [path] if isinstance(path, str | Path) else list(path)
-    files = [
-        _read_file(
-            Path(one),
-            sensors,
-            columns=(time_column, sensor_column, par_column),
-            zone=timezone,
-            time_format=time_format,
-            interval=(interval_label, interval_min),
-            unit=unit,
-            decimal=decimal,
-            missing=missing,
-        )
-        for one in paths
-    ]
+    said = Declared(**declared)
+    files = [_read_file(Path(one), sensors, (sensor_column, par_column), said) for one in paths]
     noticed = [found for one in files for found in one.findings]
     records = pd.concat([one.table for one in files], ignore_index=True)
     records = records.dropna(subset="par_umol_m2_s")
@@ -128,28 +102,20 @@ def read(
 
 
 def _read_file(
-    path: Path,
-    sensors: pd.DataFrame | None,
-    *,
-    columns: tuple[str, str, str],
-    zone: str,
-    time_format: str,
-    interval: tuple[str, float],
-    unit: str,
-    decimal: str,
-    missing: Sequence[str | float],
+    path: Path, sensors: pd.DataFrame | None, columns: tuple[str, str], said: Declared
 ) -> Records:
     """One file: a row a record, missing ones NaN, with `label` and `length_min` of its interval."""
-    time_column, sensor_column, par_column = columns
-    source = user_tables.read(path, decimal=decimal)
-    long, numbers = _long(source, sensors, sensor_column, par_column, missing)
-    times = time_columns.of(source, time_column, "measured.time_column")
-    zone = zone or source.timezone or times.zone or ""
-    stamps = parse(times.text, path, zone, time_format=time_format, group=_groups(long, source))
+    source = user_tables.read(path, decimal=said.decimal)
+    long, numbers = _long(source, sensors, *columns, said.flags)
+    times = time_columns.of(source, said.time_column, "measured.time_column")
+    zone = said.timezone or source.timezone or times.zone or ""
+    stamps = parse(
+        times.text, path, zone, time_format=said.time_format, group=_groups(long, source)
+    )
     long["time"] = pd.Series(stamps, index=source.cells.index).loc[long["line"]].to_numpy()
-    noticed = _in_micromoles(long, source, numbers, unit, interval[1])
-    label = interval[0] or source.interval_label or "instant"
-    long = long.assign(label=label, length_min=interval[1] or source.interval_min or 0.0)
+    noticed = _in_micromoles(long, source, numbers, said)
+    label = said.interval_label or source.interval_label or "instant"
+    long = long.assign(label=label, length_min=said.interval_min or source.interval_min or 0.0)
     flags = {name: one.missing for name, one in numbers.items() if one.missing}
     noticed += [
         findings.note(path, f"{sum(counts.values())} values of {name} missing "
@@ -175,10 +141,9 @@ def _long(
     sensors: pd.DataFrame | None,
     sensor_column: str,
     par_column: str,
-    missing: Sequence[str | float],
+    flags: Sequence[str | float],
 ) -> tuple[pd.DataFrame, dict[str, Numbers]]:
     """One row a record: `line`, `sensor`, `column`, `par_umol_m2_s`; and the columns read."""
-    flags = (*LIGHT_FLAGS, *missing)
     if sensor_column:
         sensor: str | None = source.require([sensor_column], "measured.sensor_column")
     else:
@@ -270,18 +235,14 @@ def _is_of(name: str, label: str) -> bool:
 
 
 def _in_micromoles(
-    long: pd.DataFrame,
-    source: Table,
-    columns: dict[str, Numbers],
-    declared: str,
-    interval_min: float,
+    long: pd.DataFrame, source: Table, columns: dict[str, Numbers], said: Declared
 ) -> list[Finding]:
     """Convert records in place to µmol m⁻² s⁻¹, and say what is doubtful of their unit."""
     noticed: list[Finding] = []
     for column, numbers in columns.items():
         where = f"{source.path}, column {column!r}"
         unit, doubt = units.of_column(
-            numbers.unit, column, declared, where=where, key="measured.unit",
+            numbers.unit, column, said.unit, where=where, key="measured.unit",
             known=units.PHOTON_FLUXES,
         )  # fmt: skip
         noticed += doubt
@@ -291,7 +252,7 @@ def _in_micromoles(
                                  f"Taken as {units.SUNLIGHT_UMOL_PER_J} µmol J⁻¹, which holds for "
                                  "sunlight.")
             )  # fmt: skip
-        length = interval_min or source.interval_min
+        length = said.interval_min or source.interval_min
         long.loc[long["column"] == column, "par_umol_m2_s"] *= units.photon_factor(
             unit or "umol/m2/s", length, where
         )
