@@ -18,7 +18,7 @@ import pandas as pd
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
-from dapple.formats import rami
+from dapple.formats import meshes, rami
 from dapple.frames import direction_from_angles
 from dapple.light import brf, visibility
 from dapple.scene import patterns, traced
@@ -40,7 +40,7 @@ CASES = ("black leaves", "near infrared")
 
 def load(folder: Path, variant: str) -> tuple[traced.TracedScene, float]:
     """The scene and its leaf area index."""
-    leaves = rami.disc_mesh(rami.read_discs(folder / "het01_UNI_sphere.def"))
+    leaves = meshes.of_discs(rami.read_discs(folder / "het01_UNI_sphere.def"))
     places = rami.read_places(folder / "het01_UNI_instances.def")
     index = leaves.area_m2 * len(places) / float(np.prod(CELL_M[1] - CELL_M[0]))
     scene = traced.load(Scene([Surface(leaves, places_m=places)]), variant, cell_m=CELL_M)

@@ -71,6 +71,7 @@ if LIT:
         params:
             **settings.advice.model_dump(exclude={"paths"}),
             **PILOT,
+            surfel_spacing_m=settings.surfels.spacing_m,
             tracing={"paths": settings.advice.paths, "sky_rays": settings.advice.paths}
             | tracing(
                 "tolerance",
@@ -111,6 +112,7 @@ if LIT:
             ),
             orders=settings.tradeoff.max_orders,
             polygon_size_m=settings.polygons.voxel_size_m,
+            surfel_spacing_m=settings.surfels.spacing_m,
             timestep=REFERENCE,
             seed=stream("tradeoff"),
         message:

@@ -32,6 +32,12 @@ except InputError as error:
 N_TIMES = len(time_range(**dict(settings.time)))
 PLACEMENTS = range(settings.leaves.placements if settings.source == "wood" else 1)
 VOXELS = [name for name in settings.reconstructions if name.startswith("voxels_")]
+# Those whose signals of trust are known.
+JUDGED = [
+    name
+    for name in settings.reconstructions
+    if name == "polygons" or name.startswith("voxels_")
+]
 LIT = settings.reconstructions if settings.sensors.kind != "none" else ()
 VARIANT = f"{settings.light.variant}_ad"
 # The per-timestep engine computes some of the times, a few in each job.
@@ -66,8 +72,8 @@ COMPARED = LIT if settings.measured.kind != "none" else ()
 
 
 wildcard_constraints:
-    reconstruction=r"polygons|truth|voxels_[0-9.]+",
-    meshed=r"polygons|truth",
+    reconstruction=r"polygons|surfels|truth|voxels_[0-9.]+",
+    meshed=r"polygons|surfels|truth",
     size=r"[0-9.]+",
     placement=r"[0-9]+",
     batch=r"[0-9]+",
@@ -166,6 +172,11 @@ REFERENCE = OF_BEAM | {"variant": f"{VARIANT}_rgb", "response": RESPONSE}
 REFERENCE |= settings.light.timestep.model_dump(exclude={"step_min", "times_per_job"})
 
 
+SURFELS = settings.surfels.model_dump() | {
+    "max_deviation": settings.clean.max_deviation
+}
+
+
 def tracing(*names):
     """Some of the settings by which light is traced."""
     return {name: TRACING[name] for name in names}
@@ -219,10 +230,15 @@ def timestep_positions(wildcards):
     return list(positions[first : first + BATCH])
 
 
-def wood_mesh(wildcards):
-    """The wood that light meets: the truth's in the truth, else the polygons'."""
-    meshed = "truth" if wildcards.reconstruction == "truth" else "polygons"
+def wood_of(reconstruction):
+    """The wood of a reconstruction: the truth's in the truth, else the polygons'."""
+    meshed = "truth" if reconstruction == "truth" else "polygons"
     return results(f"structure/{meshed}/wood.ply")
+
+
+def wood_mesh(wildcards):
+    """The wood that light meets."""
+    return wood_of(wildcards.reconstruction)
 
 
 def clumping_correction(wildcards):
@@ -244,6 +260,9 @@ def sized(section):
     return {
         "leaves": leaf_meshes("polygons")[0],
         "wood": results("structure/polygons/wood.ply"),
+        "surfels": (
+            leaf_meshes("surfels") if "surfels" in settings.reconstructions else []
+        ),
         "sized_leaves": [
             results(f"structure/polygons_{size}/leaves_0.ply") for size in polygons
         ],

@@ -5,6 +5,7 @@ Needs   classes/cloud.laz                 points with `Classification`
         scan/shots.parquet                every shot with its returns, misses included
 Makes   structure/polygons/*.ply, *.obj   one polygon per 5 cm voxel and class
         structure/polygons/distance.json  how far cleaned points lie from the polygons
+        structure/surfels/                leaves as discs on local surfaces, opened by the shots
         structure/voxels_{size}/          plant area density: voxels.nc, voxels.vox
 """
 
@@ -55,6 +56,37 @@ if settings.source != "wood":
         script:
             "../scripts/polygons.py"
 
+    rule surfels:
+        input:
+            cloud=results("classes/cloud.laz"),
+            shots=results("scan/shots.parquet") if settings.has_shots else [],
+            wood=results("structure/polygons/wood.ply"),
+            truth=(
+                results("structure/truth/summary.json")
+                if settings.source == "virtual"
+                else []
+            ),
+            code=code("surfels"),
+        output:
+            leaves=results("structure/surfels/leaves_0.ply"),
+            summary=results("structure/surfels/summary.json"),
+        log:
+            logs("surfels"),
+        benchmark:
+            benchmarks("surfels")
+        conda:
+            "../envs/dapple.yaml"
+        threads: 2
+        resources:
+            mem_mb=4000,
+        params:
+            **SURFELS,
+            seed=stream("surfels"),
+        message:
+            said("leaves as discs on local surfaces")
+        script:
+            "../scripts/surfels.py"
+
     rule cloud_to_mesh:
         input:
             cloud=results("clean/cloud.laz"),
@@ -85,7 +117,7 @@ if settings.source != "wood":
 rule export_obj:
     input:
         leaves=results("structure/{meshed}/leaves_0.ply"),
-        wood=results("structure/{meshed}/wood.ply"),
+        wood=lambda wildcards: wood_of(wildcards.meshed),
         code=code("export_obj"),
     output:
         leaves=results("structure/{meshed}/leaves.{axes}.obj"),
@@ -148,7 +180,7 @@ rule export:
             meshed=[
                 name
                 for name in settings.reconstructions
-                if name in ("polygons", "truth")
+                if name in ("polygons", "surfels", "truth")
             ],
             kind=["leaves", "wood"],
             axes=["less", "dart"],

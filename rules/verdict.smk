@@ -6,8 +6,6 @@ Needs   classes/cloud.laz; scan/shots.parquet, structure/, light/, sky/ and stat
 Makes   verdict.json      green, amber or red for every reconstruction, with reasons and remedies
 """
 
-JUDGED = [name for name in settings.reconstructions if name != "truth"]
-
 
 rule verdict:
     input:

@@ -54,7 +54,9 @@ def main(snakemake):
     print(f"chosen: {model}", flush=True)
     sizes = geometries.polygons(
         params.polygon_sizes_m, inputs.sized_leaves, inputs.sized_wood, around
-    ) + geometries.voxels(params.voxel_sizes_m, inputs.voxels, base, around)
+    )
+    sizes += geometries.surfels(params.surfel_spacing_m, inputs.surfels, inputs.wood, around)
+    sizes += geometries.voxels(params.voxel_sizes_m, inputs.voxels, base, around)
     effects = advise.geometry_effects(one, base, sizes, truth=truth, variant=params.variant)
     facts |= {
         "geometry": refinements.rows(effects),

@@ -35,6 +35,7 @@ def main(snakemake):
     sizes = geometries.polygons(
         params.polygon_sizes_m, inputs.sized_leaves, inputs.sized_wood, around
     ) or [geometries.Geometry("polygons", params.polygon_size_m, lambda: base)]
+    sizes += geometries.surfels(params.surfel_spacing_m, inputs.surfels, inputs.wood, around)
     sizes += geometries.voxels(params.voxel_sizes_m, inputs.voxels, base, around)
     points = grid.points(sizes, params.polygon_size_m)
     tables.write(snakemake.output.points, tradeoff.table(points))

@@ -20,7 +20,7 @@ STABILITY_BASE = (
 # Finer scans and needles fill memory; what they need was measured.
 STABILITY_LARGE = {"angular_step": 5000, "leaf_size": 5000}
 
-WORSENED = [name for name in COMPARED if name != "truth"]
+WORSENED = [name for name in COMPARED if name in JUDGED]
 
 STABILITY_STRESSORS = STABILITY.stressors or tuple(STRESSORS)
 STABILITY_RECONSTRUCTIONS = chosen(STABILITY.reconstructions, settings.voxels.sizes_m)
@@ -35,6 +35,7 @@ def stability_setup():
         | {"pdal": settings.tools.pdal, "cloudcompare": settings.tools.cloudcompare},
         "classify": settings.classify.model_dump(),
         "polygons": settings.polygons.model_dump(),
+        "surfels": SURFELS,
         "voxels": settings.voxels.model_dump(exclude={"sizes_m"}),
         "sizes_m": settings.voxels.sizes_m,
         "leaves": settings.leaves.model_dump(),

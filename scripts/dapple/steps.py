@@ -5,7 +5,7 @@ the same functions one after the other. From points to light:
 
     cloud.clean.clean         points without noise, one a voxel
     cloud.classify.classify   leaf or wood
-    polygons, voxels          what a scan is rebuilt as
+    polygons, surfels, voxels what a scan is rebuilt as
     scene                     what light meets
     sun, paths, products      shadow rays to the sun's disc; paths back from the sensors, once for
                               any sky and spectrum; both put together under a sky
@@ -32,6 +32,7 @@ from dapple.scene.scene_optics import Optics
 from dapple.scene.surfaces import Scene, of_kinds
 from dapple.scene.traced import TracedScene
 from dapple.sky.open_sky import towards_sun
+from dapple.structure import surfels as discs
 from dapple.structure.polygons import reconstruct
 from dapple.structure.returns import Kinds, kinds_by_place
 from dapple.structure.voxel_sums import Grid
@@ -67,6 +68,36 @@ def polygons(cloud: Cloud, *, seed: int, **settings: Any) -> dict[str, Mesh]:
         if len(wood_m)
         else mesh_files.empty(),
     }
+
+
+def surfels(
+    cloud: Cloud, shots: Shots | Iterable[Shots] | None, *, seed: int, **settings: Any
+) -> tuple[Mesh, dict[str, Any]]:
+    """Leaves as discs on the surfaces that leaf points lie on.
+
+    Parameters
+    ----------
+    cloud : Cloud
+        With `Classification`.
+    shots : Shots, iterable of Shots or None
+        The whole scan, misses included, where it is known.
+    seed : int
+    **settings
+        Of `structure.surfels.reconstruct`.
+
+    Returns
+    -------
+    leaves : Mesh
+    facts : dict
+
+    Raises
+    ------
+    EmptyCloudError
+        No point is leaf.
+    """
+    leaf_m = cloud.xyz_m[cloud.attributes["Classification"] == LEAF]
+    shots = [shots] if isinstance(shots, Shots) else shots
+    return discs.reconstruct(leaf_m, shots, seed=seed, **settings)
 
 
 def voxels(

@@ -6,7 +6,7 @@ import pytest
 import xarray as xr
 
 from dapple.errors import InputError
-from dapple.formats import rami
+from dapple.formats import meshes, rami
 from dapple.formats.meshes import Mesh
 from dapple.frames import direction_from_angles
 from dapple.light import brf
@@ -107,7 +107,7 @@ def test_a_layer_scatters_once_by_its_phase_function(rho, tau):
 
 
 def test_sun_and_view_may_change_places():
-    scene, leaf = Scene(of_kinds(leaf=rami.disc_mesh(discs()))), optics(0.45, 0.4, 0.2)
+    scene, leaf = Scene(of_kinds(leaf=meshes.of_discs(discs()))), optics(0.45, 0.4, 0.2)
     places = [(30.0, 0.0), (55.0, 130.0)]
     (first, error_1), (second, error_2) = (
         factor(scene, looking(*view), leaf, sun=direction_from_angles(*sun), n_paths=60_000)
@@ -118,7 +118,7 @@ def test_sun_and_view_may_change_places():
 
 
 def test_nothing_is_lost_where_nothing_absorbs():
-    scene = Scene(of_kinds(leaf=rami.disc_mesh(discs())), voxels(0.3))
+    scene = Scene(of_kinds(leaf=meshes.of_discs(discs())), voxels(0.3))
     up = looking([0.0])
     value, error = factor(scene, up, optics(0.6, 0.4, 1.0), cosine=True, max_orders=250)
     assert value[0] == pytest.approx(1.0, abs=4 * error[0])
@@ -131,7 +131,9 @@ def test_leaves_that_reach_over_a_side_come_in_at_the_other():
     shifted = leaves.copy()
     shifted[:, 1:3] += [3.1, -1.7]
     (first, error), (second, _) = (
-        factor(Scene(of_kinds(leaf=rami.disc_mesh(d))), looking([50.0], 30.0), leaf, n_paths=60_000)
+        factor(
+            Scene(of_kinds(leaf=meshes.of_discs(d))), looking([50.0], 30.0), leaf, n_paths=60_000
+        )
         for d in (leaves, shifted)
     )
     assert first[0] == pytest.approx(second[0], abs=4 * 1.5 * error[0])
@@ -140,7 +142,7 @@ def test_leaves_that_reach_over_a_side_come_in_at_the_other():
 
 def test_a_repeated_cell_looks_like_many_of_them():
     """A cell of 2 × 2 copies is the same endless scene as one copy repeated."""
-    one, leaf = rami.disc_mesh(discs()), optics(0.45, 0.4, 0.2)
+    one, leaf = meshes.of_discs(discs()), optics(0.45, 0.4, 0.2)
     places = np.array([(x, y, 0.0) for x in (0.0, 4.0) for y in (0.0, 4.0)])
     small = traced.load(Scene(of_kinds(leaf=one)), cell_m=CELL)
     large = traced.load(Scene([Surface(one, places_m=places)]), cell_m=2 * CELL)
@@ -154,7 +156,7 @@ def test_a_repeated_cell_looks_like_many_of_them():
 
 
 def test_one_trace_serves_all_bands():
-    scene = traced.load(Scene(of_kinds(leaf=rami.disc_mesh(discs()))), cell_m=CELL)
+    scene = traced.load(Scene(of_kinds(leaf=meshes.of_discs(discs()))), cell_m=CELL)
     views = brf.over_cell(scene, looking([0.0, 40.0]))
     received = brf.collect(scene, views, SUN, n_paths=5000, max_orders=100, seed=1)
     bands = Optics.of_tree(
@@ -171,7 +173,7 @@ def test_one_trace_serves_all_bands():
 
 
 def test_the_answer_depends_neither_on_threads_nor_on_blocks(monkeypatch):
-    scene = traced.load(Scene(of_kinds(leaf=rami.disc_mesh(discs())), voxels(0.5)), cell_m=CELL)
+    scene = traced.load(Scene(of_kinds(leaf=meshes.of_discs(discs())), voxels(0.5)), cell_m=CELL)
     views = brf.over_cell(scene, looking([10.0, 40.0]))
     threads = dr.thread_count()
     try:
@@ -191,7 +193,7 @@ def test_discs_keep_their_area_and_their_tilt(tmp_path):
     table = discs(20)
     np.savetxt(tmp_path / "discs.def", table)
     read = rami.read_discs(tmp_path / "discs.def")
-    mesh = rami.disc_mesh(read)
+    mesh = meshes.of_discs(read)
     assert mesh.n_elements == 20
     np.testing.assert_allclose(mesh.element_area_m2, np.pi * 0.2**2, rtol=1e-12)
     along = np.abs((mesh.element_normal * table[:, 4:]).sum(axis=1))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dapple.errors import InputError
-from dapple.formats import rami
+from dapple.formats import meshes
 from dapple.formats.meshes import Mesh
 from dapple.frames import direction_from_angles
 from dapple.light import brf
@@ -34,7 +34,7 @@ def canopy(n=250, seed=3):
     normals = rng.normal(size=(n, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     places = rng.uniform([0, 0, 1.0], [4, 4, 3.0], (n, 3))
-    leaves = rami.disc_mesh(np.column_stack([np.full(n, 0.15), places, normals]))
+    leaves = meshes.of_discs(np.column_stack([np.full(n, 0.15), places, normals]))
     slope = quad((-8, 12), (-8, 12), lambda x, _: 0.8 + 0.1 * x)
     return Scene(of_kinds(leaf=leaves, ground=slope))
 

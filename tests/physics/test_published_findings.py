@@ -50,6 +50,7 @@ def world() -> Chain:
         | {"outlier_backend": "none", "pdal": settings.tools.pdal},
         classify=settings.classify.model_dump(),
         polygons=settings.polygons.model_dump(),
+        surfels={},
         voxels=settings.voxels.model_dump(exclude={"sizes_m"}) | {"contact_voxel_m": 0.0},
         leaves={},
         sensors={"columns": 8, "rows": 8, "spacing_m": 0.45, "height_m": 0.1},

@@ -64,6 +64,7 @@ def test_voxels_are_rebuilt_in_the_sizes_that_are_configured():
     assert reconstructions.chosen([], (0.1,)) == [
         "polygons",
         "voxels_0.1",
+        "surfels",
         "virtual_leaves",
         "polygons_corrected",
         "voxels_0.1_corrected",

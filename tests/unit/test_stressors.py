@@ -31,6 +31,7 @@ SETUP = Setup(
     clean={},
     classify={},
     polygons={},
+    surfels={},
     voxels={},
     leaves={},
     sensors={"columns": 3, "rows": 2, "spacing_m": 0.5, "height_m": 0.1},

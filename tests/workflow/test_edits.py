@@ -1,6 +1,6 @@
 """Each edit reruns exactly what depends on it: keys, code and data against the jobs to rerun.
 
-Jobs are counted, as in `transport*3`: of four reconstructions three are traced again.
+Jobs are counted, as in `transport*4`: of five reconstructions four are traced again.
 """
 
 import os
@@ -30,12 +30,12 @@ def traced(n):
 
 MAP = "ground_map ground_map_figure"
 SHAPED = f"{MAP} cloud_to_mesh voxels_summary*2 tree_figure"
-POLYGONS = f"polygons {SHAPED}"
-CLASSES = f"classify {POLYGONS} voxels*2 {traced(3)}"
+POLYGONS = f"polygons surfels {SHAPED}"  # their wood is that of surfels too
+CLASSES = f"classify {POLYGONS} voxels*2 {traced(4)}"
 SCAN = f"scan clean {CLASSES}"
-PLANT = f"plant scan clean classify {POLYGONS} voxels*2 sensors {traced(4)}"  # the truth as well
-SKY = f"light*4 {checked(4)} {MAP} {COMPARED}"
-OWN_CHECK = f"{checked(4)} {MAP}"
+PLANT = f"plant scan clean classify {POLYGONS} voxels*2 sensors {traced(5)}"  # the truth as well
+SKY = f"light*5 {checked(5)} {MAP} {COMPARED}"
+OWN_CHECK = f"{checked(5)} {MAP}"
 
 KEYS = {
     "plant={leaf_area_m2: 6}": PLANT,
@@ -43,24 +43,25 @@ KEYS = {
     "clean={thin_voxel_m: 0.02}": f"clean {CLASSES}",
     "clean={distance_points: 1000}": "cloud_to_mesh",
     "classify={threshold_db: -5}": CLASSES,
-    "polygons={voxel_size_m: 0.06}": f"{POLYGONS} {traced(3)}",
+    "polygons={voxel_size_m: 0.06}": f"{POLYGONS} {traced(4)}",
+    "surfels={overlap: 1.5}": f"surfels {traced(1)}",
     "voxels={estimator: ppl}": f"voxels*2 voxels_summary*2 {traced(2)}",
     "corrections={clumping: true}": f"voxels*2 voxels_summary*2 {traced(2)}",
     "radiation={linke_turbidity: 4}": f"sky {SKY}",
     "optics={leaf: {chlorophyll_ug_cm2: 30}}": f"optics {SKY}",
     "site={timezone: UTC}": "series_figure",
     "time={end: 2023-08-10 16:30}": f"sky {SKY}",
-    "sensors={height_m: 0.2}": f"sensors tree_figure {traced(4)}",
+    "sensors={height_m: 0.2}": f"sensors tree_figure {traced(5)}",
     # The map of the ground shows level light, whatever sensors read.
-    "sensors={response: hemispherical}": traced(4),
+    "sensors={response: hemispherical}": traced(5),
     "measured={noise_relative: 0.03}": COMPARED,
     "registration={origin_m: [1, 0, 0]}": "",  # a grid stands in the tree's own frame
-    "light={transport: {max_orders: 8}}": f"transport*4 light*4 agreement {COMPARED}",
-    "light={transport: {max_shadow_rays: 99}}": f"light*4 agreement {COMPARED}",
+    "light={transport: {max_orders: 8}}": f"transport*5 light*5 agreement {COMPARED}",
+    "light={transport: {max_shadow_rays: 99}}": f"light*5 agreement {COMPARED}",
     "light={timestep: {replicates: 5}}": OWN_CHECK,
-    "light={timestep: {step_min: 120}}": "timesteps*4 reference*4 agreement",
+    "light={timestep: {step_min: 120}}": "timesteps*5 reference*5 agreement",
     "light={sun_diameter_deg: 0.5}": SKY,
-    "ground_z_m=-0.1": f"scan clean {CLASSES} sensors".replace(traced(3), traced(4)),
+    "ground_z_m=-0.1": f"scan clean {CLASSES} sensors".replace(traced(4), traced(5)),
     "statistics={confidence: 0.9}": f"record_statistics {FIGURES}",
     "figures={map_spacing_m: 0.4}": MAP,
     "figures={sensors: [1_1]}": "series_figure",
@@ -71,14 +72,15 @@ CODE = {
     "virtual/plants.py": PLANT,
     "virtual/scanner.py": SCAN,
     "cloud/clean.py": f"clean {CLASSES}",
-    "structure/polygons.py": f"{POLYGONS} {traced(3)}",
+    "structure/polygons.py": f"{POLYGONS} {traced(4)}",
+    "structure/surfels.py": f"surfels {traced(1)}",
     "structure/voxels.py": f"voxels*2 voxels_summary*2 {traced(2)}",
     "structure/occlusion.py": "verdict",  # the correction is turned off
     "sky/sun.py": f"sky {SKY}",
     "sky/models/perez.py": f"sky {SKY}",
-    "scene/sensors.py": f"sensors tree_figure {traced(4)}",
-    "light/paths.py": f"transport*4 light*4 agreement {COMPARED}",
-    "light/series.py": f"light*4 agreement {COMPARED}",
+    "scene/sensors.py": f"sensors tree_figure {traced(5)}",
+    "light/paths.py": f"transport*5 light*5 agreement {COMPARED}",
+    "light/series.py": f"light*5 agreement {COMPARED}",
     "light/timestep.py": OWN_CHECK,
     "light/moved_sensors.py": "verdict",
     "registration/fit.py": "",  # nothing is fitted
@@ -91,7 +93,7 @@ CODE = {
     "survey/plan.py": "",
 }
 DATA = {
-    "sensors.csv": f"sensors tree_figure {traced(4)}",
+    "sensors.csv": f"sensors tree_figure {traced(5)}",
     "par.csv": COMPARED,
     "radiation.csv": f"sky {SKY}",
     "bark.csv": f"optics {SKY}",

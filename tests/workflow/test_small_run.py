@@ -11,7 +11,7 @@ import yaml
 
 from dapple.config.settings import validate
 
-RECONSTRUCTIONS = ["polygons", "voxels_0.2", "voxels_1.0", "truth"]
+RECONSTRUCTIONS = ["polygons", "surfels", "voxels_0.2", "voxels_1.0", "truth"]
 N_SENSORS, N_TIMES = 6, 6
 LIGHT = ("par", "par_direct", "par_sky", "par_scattered", "standard_error")
 COLUMNS = {
@@ -32,6 +32,8 @@ CHEAP = [
     "structure/polygons/leaves_0.ply",
     "structure/polygons/wood.ply",
     "structure/polygons/summary.json",
+    "structure/surfels/leaves_0.ply",
+    "structure/surfels/summary.json",
     "structure/voxels_0.2/voxels.nc",
     "structure/voxels_0.2/voxels.vox",
     "structure/voxels_0.2/summary.json",

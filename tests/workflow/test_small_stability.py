@@ -5,7 +5,7 @@ import pytest
 from tests.workflow.project import copy_of_project
 
 STRESSORS = ["leaf_area", "noise_points", "scan_positions", "sensor_position"]
-METHODS = {"polygons", "voxels_0.2", "voxels_1.0", "virtual_leaves"}
+METHODS = {"polygons", "surfels", "voxels_0.2", "voxels_1.0", "virtual_leaves"}
 
 
 @pytest.fixture(scope="module")

@@ -16,6 +16,9 @@ from dapple.light.series import Light
 from dapple.scene import traced
 from dapple.scene.surfaces import LEAF, Scene
 
+LADDERS = {"polygon_size_m": "polygons", "surfel_spacing_m": "surfels", "voxel_size_m": "voxels"}
+"""Kinds of geometry by the name of what is refined in them."""
+
 
 def advise(
     pilot: Pilot,
@@ -93,14 +96,14 @@ def geometry_effects(
     truth: Light | None,
     variant: str,
 ) -> list[Effect]:
-    """Polygons and voxels of all sizes, and the tree without its wood."""
+    """Polygons, surfels and voxels of all sizes, and the tree without its wood."""
 
     def loading(scene_of):
         return lambda: traced.load(scene_of(), variant)
 
     ladders: dict[str, list[tuple[Any, Any]]] = {
         name: [(one.size_m, loading(one.load)) for one in geometries if one.kind == kind]
-        for name, kind in (("polygon_size_m", "polygons"), ("voxel_size_m", "voxels"))
+        for name, kind in LADDERS.items()
     }
     bare = Scene(base.of(LEAF), None, base.ground_z_m)
     ladders["wood"] = [("present", loading(lambda: base)), ("absent", loading(lambda: bare))]

@@ -15,9 +15,10 @@ class Geometry:
 
     Attributes
     ----------
-    kind : {"polygons", "voxels"}
+    kind : {"polygons", "surfels", "voxels"}
     size_m : float
-        Edge of the voxels that polygons were made in, or of the turbid voxels [m].
+        Edge of the voxels that polygons were made in, or of the turbid voxels; distance of the
+        points that carry surfels [m].
     load : callable
         Reads the scene.
     """
@@ -37,6 +38,15 @@ def polygons(
 
     files = zip(sizes_m, leaves, wood, strict=False)
     return [Geometry("polygons", size_m, load(*paths)) for size_m, *paths in files]
+
+
+def surfels(spacing_m: float, leaves: Sequence[str], wood: str, around: Around) -> list[Geometry]:
+    """Surfels, where the run makes them."""
+
+    def load(path: str) -> Callable[[], Scene]:
+        return lambda: scene_files.read([path], wood, around)[0]
+
+    return [Geometry("surfels", spacing_m, load(path)) for path in leaves]
 
 
 def voxels(

@@ -102,7 +102,7 @@ class Grid:
         for_timesteps = []
         for geometry in geometries:
             name = geometry.kind
-            name = name if name == "polygons" else f"voxels_{geometry.size_m}"
+            name = f"voxels_{geometry.size_m}" if name == "voxels" else name
             is_base = name == "polygons" and geometry.size_m == base_size_m
             scene = geometry.load()
             loaded, load_cost = repeated(partial(traced.load, scene, self.variant), self.repeats)

@@ -36,6 +36,8 @@ def check(settings: Settings, where: str) -> None:
 def reconstructions(settings: Settings, where: str) -> None:
     """Each is known, and named once."""
     known = ["polygons", *(f"voxels_{size}" for size in settings.voxels.sizes_m)]
+    if settings.source != "wood":
+        known.insert(1, "surfels")
     if settings.source == "virtual":
         known.append("truth")
     for name in settings.reconstructions:

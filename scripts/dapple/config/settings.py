@@ -35,6 +35,7 @@ from dapple.config.sensors import Sensors
 from dapple.config.site import Site
 from dapple.config.stability import Stability
 from dapple.config.statistics import Statistics
+from dapple.config.surfels import Surfels
 from dapple.config.survey import Survey
 from dapple.config.time import Time
 from dapple.config.tools import Tools
@@ -59,7 +60,7 @@ class Settings(Section):
         "virtual", "a virtual tree and scan, real wood with virtual leaves, or a point cloud"
     )
     reconstructions: Some[str] = key(
-        ("polygons", "voxels_0.2", "voxels_1.0", "truth"), "what light is computed for"
+        ("polygons", "surfels", "voxels_0.2", "voxels_1.0", "truth"), "what light is computed for"
     )
     ground_z_m: float | None = key(
         None, "height of flat ground; none: found in the cloud, else 0 of the tree's frame"
@@ -76,6 +77,7 @@ class Settings(Section):
     clean: Clean = Clean()
     classify: Classify = Classify()
     polygons: Polygons = Polygons()
+    surfels: Surfels = Surfels()
     voxels: Voxels = Voxels()
     corrections: Corrections = Corrections()
     site: Site = Site()

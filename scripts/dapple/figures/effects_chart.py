@@ -20,6 +20,7 @@ NAMES = {
     "bands": "bands: {}",
     "step_min": "sun every {} min",
     "polygon_size_m": "polygons in {} m voxels",
+    "surfel_spacing_m": "surfels {} m apart",
     "voxel_size_m": "turbid voxels of {} m",
     "wood": "wood {}",
 }

@@ -17,8 +17,11 @@ from dapple.formats import tables
 
 MARKERS = {"transport": ("o", "circle"), "timestep": ("s", "square")}
 ENGINES = {"transport": "transport engine", "timestep": "per-timestep Mitsuba"}
-POLYGON_SHADES = ("#003B5C", "#0072B2", "#56A6D8", "#9CCBEB")
-VOXEL_SHADES = ("#7A5C00", "#E69F00", "#D55E00", "#CC79A7")
+SHADES = {
+    "polygons": ("#003B5C", "#0072B2", "#56A6D8", "#9CCBEB"),
+    "surfels": ("#5B3A8C",),
+    "voxels": ("#7A5C00", "#E69F00", "#D55E00", "#CC79A7"),
+}
 FRONT_COLOUR = "#1A1A1A"
 LABEL_GAP = 0.045
 """Least distance of labels, as a share of the panel's height."""
@@ -29,13 +32,13 @@ LABEL_WIDTH, LABEL_SHIFT = 0.18, 0.03
 def groups(points: pd.DataFrame) -> list[tuple[str, str, str, pd.DataFrame]]:
     """Points of one geometry and engine: label, colour, engine, rows by cost."""
     shades: dict[tuple[str, Any], str] = {}
-    for kind, palette in (("polygons", POLYGON_SHADES), ("voxels", VOXEL_SHADES)):
+    for kind, palette in SHADES.items():
         sizes = sorted(points.loc[points["reconstruction"].str.startswith(kind), "size_m"].unique())
         shades |= {(kind, size): palette[k % len(palette)] for k, size in enumerate(sizes)}
     found = []
     for (engine, name, size), own in points.groupby(["engine", "reconstruction", "size_m"]):
         kind = name.split("_")[0]
-        length = f"{100 * size:g} cm" if size < 0.1 or kind == "polygons" else f"{size:g} m"
+        length = f"{100 * size:g} cm" if size < 0.1 or kind != "voxels" else f"{size:g} m"
         label = f"{kind} {length}"
         found.append((label, shades[kind, size], engine, own.sort_values("cost_s")))
     return found

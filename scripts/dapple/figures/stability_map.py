@@ -9,7 +9,7 @@ from dapple.figures import style
 from dapple.stability import thresholds
 from dapple.stability.stressors import STRESSORS
 
-PANELS = ("polygons", "voxels_0.2", "voxels_1.0", "virtual_leaves")
+PANELS = ("polygons", "surfels", "voxels_0.2", "voxels_1.0", "virtual_leaves")
 CLASSIFIERS = {"threshold": "reflectance threshold", "geometry": "geometry"}
 COLOUR_MAP = "cividis"
 COLUMNS = 4

@@ -18,12 +18,13 @@ PAR_UNIT = "µmol m⁻² s⁻¹"
 COLOURS = {
     "truth": "#009E73",
     "polygons": "#0072B2",
+    "surfels": "#5B3A8C",
     "voxels_0.2": "#E69F00",
     "voxels_1.0": "#CC79A7",
     "measured": "#1A1A1A",
     "baseline": "#8C8C8C",
 }
-SPARE_COLOURS = ("#D55E00", "#56B4E9", "#7A5C00", "#5B3A8C")
+SPARE_COLOURS = ("#D55E00", "#56B4E9", "#7A5C00")
 LEAF, WOOD, SENSOR, SCANNER = "#5C9A3B", "#7A5638", "#C03A2B", "#3B3F8F"
 LIGHT_MAP = "cividis"
 # From a yellow that shows on white.

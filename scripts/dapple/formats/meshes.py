@@ -81,6 +81,37 @@ def empty() -> Mesh:
     return Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32), np.zeros(0, np.int32))
 
 
+def of_discs(discs: np.ndarray, n_sides: int = 12) -> Mesh:
+    """Discs as regular polygons of the same area, one element each.
+
+    Parameters
+    ----------
+    discs : (n, 7) float64
+        Radius, centre, unit normal [m].
+    n_sides : int
+        Corners of a polygon, at least 3.
+    """
+    n = len(discs)
+    normal = discs[:, 4:]
+    helper = np.eye(3)[np.abs(normal).argmin(axis=1)]
+    across = np.cross(normal, helper)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    along = np.cross(normal, across)
+    turn = 2 * np.pi / n_sides
+    reach = discs[:, 0] * np.sqrt(2 * np.pi / (n_sides * np.sin(turn)))
+    angle = np.arange(n_sides) * turn
+    rim = across[:, None] * np.cos(angle)[:, None] + along[:, None] * np.sin(angle)[:, None]
+    vertices = discs[:, None, 1:4] + reach[:, None, None] * rim
+    step = np.arange(1, n_sides - 1)
+    fan = np.stack([np.zeros_like(step), step, step + 1], axis=1)
+    faces = np.arange(n)[:, None, None] * n_sides + fan
+    return Mesh(
+        vertices.reshape(-1, 3),
+        faces.reshape(-1, 3).astype(np.int32),
+        np.repeat(np.arange(n, dtype=np.int32), n_sides - 2),
+    )
+
+
 def concatenate(meshes: list[Mesh]) -> Mesh:
     """Put meshes together; elements keep their order and are renumbered."""
     vertex_shift = np.cumsum([0] + [len(mesh.vertices_m) for mesh in meshes])

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from dapple.errors import InputError
-from dapple.formats.meshes import Mesh
 
 
 def read_discs(path: str | Path) -> np.ndarray:
@@ -53,37 +52,6 @@ def read_places(path: str | Path) -> np.ndarray:
         No such file, or other columns.
     """
     return _table(path, 3, "x y z")
-
-
-def disc_mesh(discs: np.ndarray, n_sides: int = 12) -> Mesh:
-    """Discs as regular polygons of the same area, one element each.
-
-    Parameters
-    ----------
-    discs : (n, 7) float64
-        Radius, centre, unit normal [m].
-    n_sides : int
-        Corners of a polygon, at least 3.
-    """
-    n = len(discs)
-    normal = discs[:, 4:]
-    helper = np.eye(3)[np.abs(normal).argmin(axis=1)]
-    across = np.cross(normal, helper)
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    along = np.cross(normal, across)
-    turn = 2 * np.pi / n_sides
-    reach = discs[:, 0] * np.sqrt(2 * np.pi / (n_sides * np.sin(turn)))
-    angle = np.arange(n_sides) * turn
-    rim = across[:, None] * np.cos(angle)[:, None] + along[:, None] * np.sin(angle)[:, None]
-    vertices = discs[:, None, 1:4] + reach[:, None, None] * rim
-    step = np.arange(1, n_sides - 1)
-    fan = np.stack([np.zeros_like(step), step, step + 1], axis=1)
-    faces = np.arange(n)[:, None, None] * n_sides + fan
-    return Mesh(
-        vertices.reshape(-1, 3),
-        faces.reshape(-1, 3).astype(np.int32),
-        np.repeat(np.arange(n, dtype=np.int32), n_sides - 2),
-    )
 
 
 def _table(path: str | Path, n_columns: int, names: str) -> np.ndarray:

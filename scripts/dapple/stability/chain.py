@@ -151,6 +151,16 @@ class Chain:
         """Edge of the voxels that polygons are made in [m]."""
         return self.setup.polygons["voxel_size_m"] * conditions.voxel_factor
 
+    def surfels(self, conditions: Conditions) -> Mesh:
+        """Leaves as discs on local surfaces."""
+
+        def make() -> Mesh:
+            seed = stream_seed(self.seed, "surfels")
+            cloud, shots = self.classes(conditions), self.shots(conditions)
+            return steps.surfels(cloud, shots, seed=seed, **self.setup.surfels)[0]
+
+        return self._step("surfels", conditions, make)
+
     def voxels(self, conditions: Conditions, size_m: float) -> xr.Dataset:
         """Plant area density in voxels of a configured size (before it is multiplied)."""
 

@@ -9,7 +9,7 @@ from dapple.structure.voxel_sizes import name_of
 def names(sizes_m: Sequence[float]) -> list[str]:
     """Reconstructions for these sizes of voxels, the truth left out."""
     scanned = ["polygons", *(name_of(size) for size in sizes_m)]
-    return [*scanned, "virtual_leaves", *(f"{name}_corrected" for name in scanned)]
+    return [*scanned, "surfels", "virtual_leaves", *(f"{name}_corrected" for name in scanned)]
 
 
 def chosen(

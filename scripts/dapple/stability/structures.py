@@ -51,6 +51,12 @@ def make(chain: Chain, name: str, conditions: Conditions) -> Structure:
             return _one(chain, plant, plant["leaf"].area_m2)
         case ["polygons", *corrected]:
             return _polygons(chain, conditions, bool(corrected))
+        case ["surfels"]:
+            meshes = {
+                "leaf": chain.surfels(conditions),
+                "wood": chain.polygons(conditions)["wood"],
+            }
+            return _one(chain, meshes, meshes["leaf"].area_m2)
         case ["voxels", _, *corrected]:
             return _voxels(chain, size_of(name), conditions, bool(corrected))
         case ["virtual", "leaves"]:

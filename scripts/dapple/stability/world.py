@@ -35,7 +35,7 @@ class Setup:
 
     Attributes
     ----------
-    plant, scan, clean, classify, polygons, voxels, leaves : dict
+    plant, scan, clean, classify, polygons, surfels, voxels, leaves : dict
         As the rules of the same names pass them on.
     sizes_m : sequence of float
         Edges of the voxels [m].
@@ -59,6 +59,7 @@ class Setup:
     clean: Mapping[str, Any]
     classify: Mapping[str, Any]
     polygons: Mapping[str, Any]
+    surfels: Mapping[str, Any]
     voxels: Mapping[str, Any]
     leaves: Mapping[str, Any]
     sensors: Mapping[str, Any]

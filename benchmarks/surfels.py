@@ -1,0 +1,157 @@
+"""Polygons and surfels against the true leaves of the default tree, by the step of the scan.
+
+    python benchmarks/surfels.py [--steps 0.12 0.08 0.05] [--seed 1] [--docs docs]
+
+Grows the tree of the default configuration, scans, cleans, classifies and rebuilds it, and traces
+the share of the sun's disc that sensors see at the times of the default run. Errors are those of
+this share; partial shade is where the true share lies between 5 % and 95 %. Constants of surfels
+were chosen on trees of other seeds (docs/data/surfels.csv).
+"""
+
+import argparse
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pandas as pd
+
+from dapple import steps
+from dapple.clock import time_range
+from dapple.cloud.classify import classify
+from dapple.cloud.clean import clean
+from dapple.config.settings import Settings
+from dapple.formats import clouds, ground_surface, shots
+from dapple.formats.meshes import Mesh
+from dapple.light import visibility
+from dapple.scene import sensors, traced
+from dapple.sky.sun import position
+from dapple.streams import stream_seed
+from dapple.structure.stem import stem_position
+from dapple.virtual import scanner
+from dapple.virtual.plants import apple_tree
+
+TOLERANCE, MOST_RAYS = 0.005, 4096
+"""Of the share of the sun's disc, and rays for it."""
+LIT, SHADED = 0.95, 0.05
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--steps", type=float, nargs="+", default=[0.12, 0.08, 0.05])
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--docs", type=Path, default=Path(__file__).parents[1] / "docs")
+    options = parser.parse_args()
+    settings = Settings(seed=options.seed)
+    plant = apple_tree(**settings.plant.model_dump(), seed=stream_seed(options.seed, "plant"))
+    true = {"leaf": plant.leaves, "wood": plant.wood}
+    truth, _ = sunlit(true, settings, plant.wood)
+    rows = []
+    for step_deg in options.steps:
+        for row in rebuilt(true, step_deg, settings):
+            meshes = row.pop("meshes")
+            seen, seconds = sunlit(meshes, settings, plant.wood)
+            row |= {
+                "leaf_area_m2": meshes["leaf"].area_m2,
+                "true_leaf_area_m2": plant.leaves.area_m2,
+                "triangles": sum(len(mesh.faces) for mesh in meshes.values()),
+                "light_cpu_s": seconds,
+            } | scores(seen, truth)
+            rows.append({"step_deg": step_deg} | row)
+            print(rows[-1], flush=True)
+            table = pd.DataFrame(rows)
+            table.to_csv(options.docs / "data" / "surfels.csv", index=False, float_format="%.4g")
+
+
+def rebuilt(true: dict[str, Mesh], step_deg: float, settings: Settings) -> Iterator[dict]:
+    """Reconstructions of one scan, with the processor time of each [s]."""
+    scan = settings.scan.model_dump() | {"angular_step_deg": step_deg}
+    places_m = scanner.positions_around(
+        stem_position(true["wood"]),
+        n=scan.pop("positions"),
+        radius_m=scan.pop("radius_m"),
+        height_m=scan.pop("height_m"),
+    )
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "shots.parquet"
+        seed = stream_seed(settings.seed, "scan")
+        fired = scanner.scan_chunks(true, places_m, **scan, ground_z_m=0.0, seed=seed)
+        shots.write_chunks(path, fired)
+        cloud = classified(path, settings)
+        seed = stream_seed(settings.seed, "polygons")
+        begun = time.process_time()
+        polygons = steps.polygons(cloud, seed=seed, **settings.polygons.model_dump())
+        took_s = time.process_time() - begun
+        yield {"reconstruction": "polygons", "meshes": polygons, "cpu_s": took_s}
+        for name, fired in (("surfels", shots.iterate(path)), ("surfels without shots", None)):
+            begun = time.process_time()
+            leaves, _ = steps.surfels(
+                cloud,
+                fired,
+                seed=stream_seed(settings.seed, "surfels"),
+                **settings.surfels.model_dump(),
+                max_deviation=settings.clean.max_deviation,
+            )
+            took_s = time.process_time() - begun
+            meshes = polygons | {"leaf": leaves}
+            yield {"reconstruction": name, "meshes": meshes, "cpu_s": took_s}
+        meshes = polygons | {"leaf": true["leaf"]}
+        yield {"reconstruction": "true leaves", "meshes": meshes, "cpu_s": 0.0}
+
+
+def classified(path: Path, settings: Settings) -> clouds.Cloud:
+    """Points of a scan, cleaned and told apart."""
+    parts = [shots.to_cloud(chunk) for chunk in shots.iterate(path)]
+    names = parts[0].attributes
+    cloud = clouds.Cloud(
+        np.concatenate([part.xyz_m for part in parts]),
+        parts[0].origin_m,
+        {name: np.concatenate([part.attributes[name] for part in parts]) for name in names},
+    )
+    options = settings.clean.model_dump(exclude={"distance_points"})
+    programs = {"pdal": settings.tools.pdal, "cloudcompare": settings.tools.cloudcompare}
+    cloud, _ = clean(cloud, ground=ground_surface.flat(0.0), where="scan", **options, **programs)
+    options = settings.classify.model_dump()
+    seed = stream_seed(settings.seed, "classify")
+    return classify(cloud, where="scan", **options, seed=seed)[0]
+
+
+def sunlit(meshes: dict[str, Mesh], settings: Settings, wood: Mesh) -> tuple[np.ndarray, float]:
+    """Share of the sun's disc (sensor, time), and the processor time that it took [s]."""
+    grid = settings.sensors.grid()
+    places = sensors.grid_around(stem_position(wood), **grid)[["x_m", "y_m", "z_m"]].to_numpy()
+    site = settings.site
+    times = time_range(**dict(settings.time))
+    sun = position(times, site.latitude_deg, site.longitude_deg, site.altitude_m)
+    zenith, azimuth = (
+        np.radians(sun[f"sun_{name}_deg"].to_numpy()) for name in ("zenith", "azimuth")
+    )
+    towards = [np.sin(zenith) * np.sin(azimuth), np.sin(zenith) * np.cos(azimuth), np.cos(zenith)]
+    scene = traced.load(steps.scene(meshes))
+    begun = time.process_time()
+    seen = visibility.sunlit(
+        scene,
+        places,
+        np.stack(towards, axis=1),
+        tolerance=TOLERANCE,
+        max_rays=MOST_RAYS,
+        seed=stream_seed(settings.seed, "sun"),
+        sun_diameter_deg=settings.light.sun_diameter_deg,
+    )
+    return seen.share.mean(axis=0), time.process_time() - begun
+
+
+def scores(seen: np.ndarray, truth: np.ndarray) -> dict[str, float]:
+    """Error and correlation of the visible share."""
+    partial = (truth > SHADED) & (truth < LIT)
+    return {
+        "rmse": float(np.sqrt(np.mean((seen - truth) ** 2))),
+        "bias": float(np.mean(seen - truth)),
+        "r": float(np.corrcoef(seen.ravel(), truth.ravel())[0, 1]),
+        "r_partial_shade": float(np.corrcoef(seen[partial], truth[partial])[0, 1]),
+    }
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,140 @@
+"""Leaves as small discs on the surfaces that points lie on, as large as shots allow."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from dapple.errors import EmptyCloudError
+from dapple.formats import meshes
+from dapple.formats.meshes import Mesh
+from dapple.formats.shots import Shots
+from dapple.structure import local_planes, shot_evidence
+
+NEIGHBOURS = 30
+"""Points around a point that its plane is fitted to, at most."""
+RING = 6
+"""The distance of so many neighbours on its surface tells how large a point's share of it is."""
+AGREEMENT_NOISES = 2.0
+"""Width of the agreement of points with a plane, in standard deviations of the noise."""
+ON_SURFACE_NOISES = 2.0
+"""Points this near to a plane, in the same, are on its surface."""
+HIT_NOISES = 3.0
+"""Returns this near to a disc, in the same, end at it."""
+LARGEST = 1.5
+"""Largest radius, in medians of all radii: points that stand alone say little of an area."""
+SIDES = 6
+"""Of the polygons that discs are drawn as, equal in area."""
+
+
+def reconstruct(
+    points_m: np.ndarray,
+    shots: Iterable[Shots] | None,
+    *,
+    reach_m: float,
+    noise_m: float,
+    spacing_m: float,
+    overlap: float,
+    max_deviation: float,
+    seed: int,
+) -> tuple[Mesh, dict[str, Any]]:
+    """Lay a disc on the local surface at each of the thinned points.
+
+    Points are drawn onto planes that the points around them agree on, and thinned. A disc is as
+    large as the point's share of the surface, times `overlap`. Where shots are known, its area is
+    multiplied by the share of the shots through it that ended at it: what later returns and misses
+    passed is open. Without shots the distance of points alone decides, and facts say so.
+
+    Parameters
+    ----------
+    points_m : (n, 3) float64
+        Leaf points in the local frame [m].
+    shots : iterable of Shots or None
+        The whole scan in the same frame, misses included.
+    reach_m : float
+        Farthest points that tell of a point's surface [m].
+    noise_m : float
+        Standard deviation of points across their surface [m].
+    spacing_m : float
+        Of the thinned points [m].
+    overlap : float
+        Area of a disc over the point's share of the surface: discs that leave no gaps overlap.
+    max_deviation : float
+        Returns at or above are mixed of several targets, and what is near them is not known.
+    seed : int
+        Turns the discs of points without a surface.
+
+    Returns
+    -------
+    leaves : Mesh
+        One element a disc.
+    facts : dict
+        `point_spacing_m` (median, of the thinned points), `with_shots`, `without_surface` (share
+        of discs whose direction is chance), `shots_per_disc` and `hit_share` (means; None without
+        shots).
+
+    Raises
+    ------
+    EmptyCloudError
+        No point at all.
+    """
+    points_m = np.ascontiguousarray(points_m, np.float64).reshape(-1, 3)
+    if not len(points_m):
+        raise EmptyCloudError(
+            "surfels", "no leaf points in the cloud", "at least one", "Check the classes."
+        )
+    index, distance = local_planes.neighbours(points_m, NEIGHBOURS, reach_m)
+    width_m = AGREEMENT_NOISES * noise_m
+    normal, offset, support = local_planes.fit(points_m, index, distance, reach_m, width_m)
+    drawn_m = points_m + offset[:, None] * normal
+    kept = _thinned(drawn_m, support, spacing_m)
+    centre, normal = drawn_m[kept], normal[kept]
+    is_alone = support[kept] == 0
+    chance = np.random.default_rng(seed).normal(size=(int(is_alone.sum()), 3))
+    normal[is_alone] = chance / np.linalg.norm(chance, axis=1, keepdims=True)
+    radius = _radius(centre, normal, reach_m, ON_SURFACE_NOISES * noise_m, spacing_m)
+    radius *= np.sqrt(overlap)
+    known = None if shots is None else shot_evidence.build(shots, max_deviation)
+    facts = {
+        "point_spacing_m": float(np.median(radius) * np.sqrt(np.pi / overlap)),
+        "with_shots": known is not None,
+        "without_surface": float(is_alone.mean()),
+        "shots_per_disc": None,
+        "hit_share": None,
+    }
+    if known is not None:
+        share, count = shot_evidence.hit_shares(
+            known.arrays, centre, normal, radius, HIT_NOISES * noise_m
+        )
+        share = np.where(np.isnan(share), 1.0, share)
+        facts |= {"shots_per_disc": float(count.mean()), "hit_share": float(share.mean())}
+        radius *= np.sqrt(share)
+    is_there = radius > 0
+    discs = np.column_stack([radius, centre, normal])[is_there]
+    return meshes.of_discs(discs, SIDES), facts
+
+
+def _thinned(points_m: np.ndarray, support: np.ndarray, spacing_m: float) -> np.ndarray:
+    """Indices of the points of most support in each voxel, in their order."""
+    voxel = np.floor(points_m / spacing_m).astype(np.int64)
+    order = np.argsort(-support, kind="stable")
+    _, first = np.unique(voxel[order], axis=0, return_index=True)
+    return np.sort(order[first])
+
+
+def _radius(
+    points_m: np.ndarray, normal: np.ndarray, reach_m: float, near_m: float, spacing_m: float
+) -> np.ndarray:
+    """Radius of the circle as large as each point's share of its surface [m]."""
+    index, distance = local_planes.neighbours(points_m, 2 * RING, reach_m)
+    found = index < len(points_m)
+    to = points_m[np.where(found, index, 0)] - points_m[:, None]
+    on_surface = found & (np.abs(np.einsum("nkj,nj->nk", to, normal)) < near_m)
+    rank = np.cumsum(on_surface, axis=1)
+    number = np.minimum(rank[:, -1], RING)
+    at = np.argmax(rank >= np.maximum(number, 1)[:, None], axis=1)
+    ring_m = distance[np.arange(len(points_m)), at].astype(np.float64)
+    # The circle through neighbour k holds the point, k - 1 neighbours and half of the last.
+    radius = np.where(number > 0, ring_m / np.sqrt(number + 0.5), np.nan)
+    usual = np.nanmedian(radius) if (number > 0).any() else spacing_m / np.sqrt(np.pi)
+    return np.minimum(np.where(number == RING, radius, usual), LARGEST * usual)
