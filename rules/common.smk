@@ -20,7 +20,7 @@ from dapple.errors import InputError
 from dapple.optics import responses
 from dapple.streams import stream_seed
 from dapple.structure.voxel_sizes import finer_than
-from dapple.workflow import code_of, short
+from dapple.workflow import code_of, evenly, short
 
 try:
     settings = validate(
@@ -67,6 +67,7 @@ OF_BEAM = {
     "aperture_m": settings.light.entrance_m,
 }
 CHECKED = LIT if settings.light.engine == "transport" and settings.light.check else ()
+CHECK_WITH = dict.fromkeys(settings.light.check_with)
 ADVISED = settings.light.model == "advised"
 COMPARED = LIT if settings.measured.kind != "none" else ()
 
@@ -167,6 +168,7 @@ RESPONSE = (
     if settings.sensors.response == "table"
     else responses.NAMED[settings.sensors.response]
 )
+LESS = settings.light.less
 TRACING = settings.light.transport.model_dump() | OF_BEAM | {"response": RESPONSE}
 REFERENCE = OF_BEAM | {"variant": f"{VARIANT}_rgb", "response": RESPONSE}
 REFERENCE |= settings.light.timestep.model_dump(exclude={"step_min", "times_per_job"})
@@ -223,11 +225,34 @@ def stem_wood():
     return results(f"structure/{meshed}/wood.ply")
 
 
+def is_less_sample(reconstruction):
+    """Whether LESS gets some sensors and times alone: turbid voxels are slow there."""
+    return reconstruction.startswith("voxels_") and settings.light.engine != "less"
+
+
+def less_times(reconstruction):
+    """Times that LESS computes of a reconstruction."""
+    n = len(REFERENCE_TIMES)
+    most = LESS.voxel_times if is_less_sample(reconstruction) else n
+    return [REFERENCE_TIMES[k] for k in evenly(n, most)]
+
+
+def less_batches(wildcards):
+    """The files of LESS' times, a few in each."""
+    name = wildcards.reconstruction
+    batches = range(-(-len(less_times(name)) // BATCH))
+    return [results(f"light/less_timesteps/{name}/{batch}.nc") for batch in batches]
+
+
+def batch_of(times, wildcards):
+    """Those of some times that a job computes."""
+    first = int(wildcards.batch) * BATCH
+    return list(times[first : first + BATCH])
+
+
 def timestep_positions(wildcards):
     """Which of the per-timestep engine's times a job computes."""
-    positions = range(len(REFERENCE_TIMES))
-    first = int(wildcards.batch) * BATCH
-    return list(positions[first : first + BATCH])
+    return batch_of(range(len(REFERENCE_TIMES)), wildcards)
 
 
 def wood_of(reconstruction):

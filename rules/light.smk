@@ -7,6 +7,8 @@ Makes   light/transport/{reconstruction}_{placement}.nc counted paths: any sky, 
         light/{reconstruction}.nc                       the series of all times
         light/timesteps/{reconstruction}/{batch}.nc     the independent check, some times in each file
         light/reference/{reconstruction}.nc             its series
+        light/less_timesteps/{reconstruction}/{batch}.nc
+        light/less/{reconstruction}.nc                  the same by LESS 3, another independent check
         light/ground_map.nc                             light on the ground at a few times
 """
 
@@ -71,6 +73,76 @@ rule reference:
         mem_mb=1000,
     message:
         said("series of the timesteps, {wildcards.reconstruction}")
+    script:
+        "../scripts/reference.py"
+
+
+rule less_timesteps:
+    input:
+        leaves=leaf_geometry,
+        wood=wood_mesh,
+        sky=results("sky/sky.nc"),
+        optics=results("sky/optics.nc"),
+        sensors=results("sky/sensors.csv"),
+        ground=GROUND,
+        shade=SHADE,
+        runner=beside_code("light/less_run.py"),
+        code=code("less_timesteps"),
+    output:
+        light=results("light/less_timesteps/{reconstruction}/{batch}.nc"),
+    log:
+        logs("less_timesteps/{reconstruction}/{batch}"),
+    benchmark:
+        benchmarks("less_timesteps/{reconstruction}/{batch}")
+    conda:
+        "../envs/less.yaml"
+    threads: 2
+    resources:
+        mem_mb=4000,
+    params:
+        engine={"bands": LESS.bands, "aperture_m": OF_BEAM["aperture_m"]},
+        rays={
+            "rays": LESS.rays,
+            "suns": LESS.suns,
+            "max_orders": settings.light.transport.max_orders,
+            "sun_diameter_deg": OF_BEAM["sun_diameter_deg"],
+        },
+        ground_z_m=GROUND_Z_M,
+        sensor_table=SENSOR_TABLE,
+        times=lambda wildcards: batch_of(
+            less_times(wildcards.reconstruction), wildcards
+        ),
+        most_sensors=lambda wildcards: (
+            LESS.voxel_sensors if is_less_sample(wildcards.reconstruction) else 0
+        ),
+        seed=lambda wildcards: stream("less", wildcards.batch),
+    message:
+        said("LESS 3, {wildcards.reconstruction}, times {params.times}")
+    script:
+        "../scripts/less_timesteps.py"
+
+
+rule less:
+    input:
+        times=less_batches,
+        code=code("reference"),
+    output:
+        light=(
+            results("light/{reconstruction}.nc")
+            if settings.light.engine == "less"
+            else results("light/less/{reconstruction}.nc")
+        ),
+    log:
+        logs("less_{reconstruction}"),
+    benchmark:
+        benchmarks("less_{reconstruction}")
+    conda:
+        "../envs/dapple.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    message:
+        said("series of LESS, {wildcards.reconstruction}")
     script:
         "../scripts/reference.py"
 

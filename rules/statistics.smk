@@ -6,7 +6,7 @@ Makes   statistics/records.json       what was read of the records, and what was
         statistics/records.csv        measured and simulated PAR side by side, fitting and reporting part named
         statistics/overall.csv        one line a reconstruction, reporting part only
         statistics/per_sensor.csv     one line a sensor
-        statistics/agreement.csv      transport engine against the per-timestep engine
+        statistics/agreement.csv      engines of light against each other
         statistics/mixed_model.csv    measured on simulated light, sensor as random effect
         runtime.csv                   time and memory of every step
 """
@@ -82,8 +82,15 @@ rule record_statistics:
 
 rule agreement:
     input:
-        light=[results(f"light/{name}.nc") for name in CHECKED],
-        reference=[results(f"light/reference/{name}.nc") for name in CHECKED],
+        transport=[results(f"light/{name}.nc") for name in CHECKED],
+        timestep=[
+            results(f"light/reference/{name}.nc")
+            for name in (CHECKED if "timestep" in CHECK_WITH else ())
+        ],
+        less=[
+            results(f"light/less/{name}.nc")
+            for name in (CHECKED if "less" in CHECK_WITH else ())
+        ],
         sky=results("sky/sky.nc"),
         code=code("agreement"),
     output:
@@ -99,9 +106,10 @@ rule agreement:
         mem_mb=500,
     params:
         reconstructions=CHECKED,
+        engines=["transport", *CHECK_WITH],
         response=RESPONSE,
     message:
-        said("transport engine against the per-timestep engine")
+        said("the light of {params.engines} compared")
     script:
         "../scripts/agreement.py"
 

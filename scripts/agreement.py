@@ -1,4 +1,6 @@
-"""Transport engine against the per-timestep engine, at the times that both have."""
+"""Engines of light against each other, two by two, at the times and sensors that both have."""
+
+from itertools import combinations
 
 from dapple.formats import netcdf, tables
 from dapple.sky.open_sky import open_sky_par
@@ -9,15 +11,12 @@ from dapple.workflow import run
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
     sky = open_sky_par(netcdf.read(inputs.sky), params.response)
-    rows = {}
-    for name, fast, slow in zip(
-        params.reconstructions, inputs.light, inputs.reference, strict=True
-    ):
-        reference = netcdf.read(slow)
-        times = reference["time"]
-        rows[name] = agreement.compare(
-            netcdf.read(fast).sel(time=times), reference, sky.sel(time=times)
-        )
+    rows = []
+    for engine, reference in combinations(params.engines, 2):
+        pairs = zip(inputs[engine], inputs[reference], strict=True)
+        for name, (one, other) in zip(params.reconstructions, pairs, strict=True):
+            facts = agreement.compare(netcdf.read(one), netcdf.read(other), sky)
+            rows.append({"reconstruction": name, "engine": engine, "reference": reference} | facts)
     tables.write(snakemake.output.agreement, agreement.table(rows))
 
 

@@ -1,18 +1,17 @@
 """Light at the sensors by Mitsuba's own integrators, some times of the day."""
 
-from dapple.formats import netcdf, tables
+from dapple.formats import netcdf
 from dapple.light import timestep_series
-from dapple.scene import scene_files, scene_optics, sensors
+from dapple.scene import scene_files, scene_optics
 from dapple.workflow import run
 
 
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
-    around = scene_files.around(inputs.ground or params.ground_z_m, inputs.shade)
-    scenes = scene_files.read(inputs.leaves, inputs.wood, around)
-    table = tables.read(inputs.sensors)
-    for scene in scenes:
-        sensors.check(table, scene.filled, where=params.sensor_table)
+    beside = {"ground": inputs.ground or params.ground_z_m, "shade": inputs.shade}
+    scenes, table = scene_files.read_with_sensors(
+        inputs.leaves, inputs.wood, inputs.sensors, **beside, where=params.sensor_table
+    )
     reference = timestep_series.Reference(
         scenes,
         netcdf.read(inputs.sky).isel(time=params.times),

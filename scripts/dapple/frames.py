@@ -112,6 +112,16 @@ def less_to_local(abc_m: np.ndarray) -> np.ndarray:
     return np.stack([-a, c, b], axis=-1)
 
 
+def local_to_less3(xyz_m: np.ndarray, corner_m: np.ndarray) -> np.ndarray:
+    """Local (east, north, up) to places in a scene of LESS 3: (east, south, up) of its corner.
+
+    `corner_m` (3,) is the north-western corner of the scene on the ground, local frame [m]. An OBJ
+    file of LESS in local coordinates lies right when its object is placed where the origin is.
+    """
+    x, y, z = np.moveaxis(np.asarray(xyz_m, float) - corner_m, -1, 0)
+    return np.stack([x, -y, z], axis=-1)
+
+
 def local_to_dart(xyz_m: np.ndarray) -> np.ndarray:
     """Local (east, north, up) to the vertex order of DART's OBJ files: v (y, z, x).
 

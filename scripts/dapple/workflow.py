@@ -64,6 +64,11 @@ def stop_at_errors_of(check: str | Path | None) -> None:
         findings.stop(Finding(**row) for row in rows)
 
 
+def evenly(n: int, most: int) -> list[int]:
+    """Indices of `most` of n things, evenly spread, or of all where there are no more."""
+    return [round((k + 0.5) * n / most - 0.5) for k in range(most)] if most < n else list(range(n))
+
+
 def options(params: Any) -> dict[str, Any]:
     """The named parameters of a rule, to be passed on as keyword arguments."""
     return dict(params.items())

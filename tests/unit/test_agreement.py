@@ -62,8 +62,10 @@ def test_nothing_in_common_is_an_error():
 
 def test_the_table_has_the_columns_that_others_rely_on():
     row = agreement.compare(light(1.0), light(1.0), OPEN_SKY)
-    table = agreement.table({"polygons": row})
-    assert list(table) == ["reconstruction", "n", "rmse_rel", "bias_rel", "max_abs_z"]
+    engines = {"engine": "transport", "reference": "less"}
+    table = agreement.table([{"reconstruction": "polygons"} | row | engines])
+    assert list(table)[:5] == ["reconstruction", "n", "rmse_rel", "bias_rel", "max_abs_z"]
+    assert table.loc[0, ["engine", "reference"]].tolist() == ["transport", "less"]
 
 
 def test_an_error_is_relative_to_the_open_sky_of_its_own_time_and_the_night_does_not_count():

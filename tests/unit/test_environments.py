@@ -26,7 +26,11 @@ PACKAGES = {
     "yaml": "pyyaml",
 }
 """Packages of conda that bring a module, where they are not called like it."""
-PROGRAMS = {"pdal.py": "pdal", "cloud/cloudcompare.py": "cloudcompare"}
+PROGRAMS = {
+    "pdal.py": "pdal",
+    "cloud/cloudcompare.py": "cloudcompare",
+    "light/less_engine.py": "less3d",
+}
 """Programs that modules of dapple run."""
 OPTIONAL = {"cloudComPy"}
 """Used where it can be imported; on no registry."""

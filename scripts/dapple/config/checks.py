@@ -198,13 +198,21 @@ def spectra(settings: Settings, where: str) -> None:
 
 
 def light(settings: Settings, where: str) -> None:
-    """The advice is about the transport engine."""
+    """The advice is about the transport engine; LESS has sensors that are plates."""
     if settings.light.model == "advised" and settings.light.engine != "transport":
         raise InputError(
             where,
             f"`light.model: advised` and `light.engine: {settings.light.engine}`",
             "`light.engine: transport`, which the advice is about",
             "Choose the transport engine or `light.model: full`.",
+        )
+    engines = (settings.light.engine, *settings.light.check_with)
+    if "less" in engines and settings.sensors.response != "cosine":
+        raise InputError(
+            where,
+            f"LESS for sensors with `sensors.response: {settings.sensors.response}`",
+            "`sensors.response: cosine`, the response of a level plate",
+            "Choose another engine for these sensors.",
         )
 
 

@@ -10,6 +10,8 @@ from annotated_types import Ge, Gt, Le
 from dapple.config.base import Count, NotNegative, Positive, Section, key
 from dapple.sky.solar_disc import SUN_DIAMETER_DEG
 
+Engine = Literal["transport", "timestep", "less"]
+
 
 class Transport(Section):
     """The transport engine: paths traced once, for any sky, spectrum and time."""
@@ -43,14 +45,31 @@ class Timestep(Section):
     max_depth: Annotated[int, Ge(2), Le(100)] = key(12, "longest path in segments")
 
 
+class Less(Section):
+    """The engine LESS 3: an independent program, in a process of its own."""
+
+    rays: Annotated[int, Ge(64)] = key(
+        12_800, "rays to the sky, per sensor and time, and as many to the sun", "Frey et al. 2025"
+    )
+    suns: Annotated[int, Ge(2)] = key(
+        32, "parallel suns that stand for the solar disc, 64 rays to each"
+    )
+    bands: Literal[1, 3] = key(3, "groups of bands, in one run")
+    voxel_sensors: Count = key(4, "voxels, as a check: so many sensors, evenly chosen (slow)")
+    voxel_times: Count = key(2, "voxels, as a check: at so many of the times that are checked")
+
+
 class Light(Section):
     """The light at the sensors."""
 
-    engine: Literal["transport", "timestep"] = key("transport", "what computes light/*.nc")
+    engine: Engine = key("transport", "what computes light/*.nc")
     model: Literal["full", "advised"] = key(
         "full", "as these keys say, or the cheapest model within advice.tolerance"
     )
-    check: bool = key(True, "compare the transport engine with the per-timestep engine")
+    check: bool = key(True, "compare the transport engine with the engines of check_with")
+    check_with: tuple[Literal["timestep", "less"], ...] = key(
+        ("timestep",), "Mitsuba's integrators (timestep), LESS 3 (less), or both"
+    )
     variant: Literal["llvm", "cuda"] = key("llvm", "Mitsuba on the processor or on an NVIDIA GPU")
     sun_diameter_deg: NotNegative = key(
         SUN_DIAMETER_DEG, "angular diameter of the solar disc; 0: a point"
@@ -61,6 +80,7 @@ class Light(Section):
     )
     transport: Transport = Transport()
     timestep: Timestep = Timestep()
+    less: Less = Less()
 
     @property
     def entrance_m(self) -> float:

@@ -4,8 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from dapple.formats import ground_surface, meshes, voxel_grids
+import pandas as pd
+
+from dapple.formats import ground_surface, meshes, tables, voxel_grids
 from dapple.formats.ground_surface import GroundSurface
+from dapple.scene import sensors
 from dapple.scene.surfaces import GROUND, LEAF, Scene, Surface, of_kinds
 
 MOST_NODES = 120
@@ -75,6 +78,31 @@ def read(leaves: Sequence[str], wood: str, beside: Around = LEVEL) -> list[Scene
             surfaces, voxels = of_kinds(leaf=meshes.read_ply(path), wood=branches), None
         scenes.append(Scene((*surfaces, *beside.surfaces), voxels, beside.ground_z_m))
     return scenes
+
+
+def read_with_sensors(
+    leaves: Sequence[str],
+    wood: str,
+    sensor_table: str,
+    *,
+    ground: str | float,
+    shade: str = "",
+    where: str = "",
+) -> tuple[list[Scene], pd.DataFrame]:
+    """What light meets (see `read`, `around`), and its sensors, none of which may lie in it.
+
+    Parameters
+    ----------
+    sensor_table : path
+        Table of sensors as the run has it.
+    where : str
+        What the user's table is called, for messages.
+    """
+    scenes = read(leaves, wood, around(ground, shade))
+    table = tables.read(sensor_table)
+    for scene in scenes:
+        sensors.check(table, scene.filled, where=where)
+    return scenes, table
 
 
 def read_plot(leaves: str, wood: str, terrain: str) -> Scene:

@@ -1,4 +1,4 @@
-"""The fast engine against the per-timestep reference, on the scale of the open sky."""
+"""Engines of light against each other, on the scale of the open sky."""
 
 import numpy as np
 import pandas as pd
@@ -6,7 +6,8 @@ import xarray as xr
 
 from dapple.errors import InputError
 
-COLUMNS = ["reconstruction", "n", "rmse_rel", "bias_rel", "max_abs_z"]
+FACTS = ["n", "rmse_rel", "bias_rel", "max_abs_z"]
+COLUMNS = ["reconstruction", *FACTS, "engine", "reference"]
 PAR, ERROR = "par_umol_m2_s", "standard_error_umol_m2_s"
 
 
@@ -60,7 +61,7 @@ def compare(
         )
     usable = known & (scale > 0)
     if not usable.any():
-        return {"n": 0} | dict.fromkeys(COLUMNS[2:], np.nan)
+        return {"n": 0} | dict.fromkeys(FACTS[1:], np.nan)
     relative = difference[usable] / scale[usable]
     return {
         "n": int(usable.sum()),
@@ -85,8 +86,6 @@ def rmse_rel(par: np.ndarray, reference: np.ndarray, open_sky: np.ndarray) -> fl
     return float(np.sqrt((relative**2).mean()))
 
 
-def table(rows: dict[str, dict[str, float]]) -> pd.DataFrame:
-    """One row per reconstruction, from what `compare` returned for each."""
-    return pd.DataFrame(
-        [{"reconstruction": name, **row} for name, row in rows.items()], columns=COLUMNS
-    )
+def table(rows: list[dict[str, str | float]]) -> pd.DataFrame:
+    """A row for each reconstruction and pair of engines, from what `compare` returned for it."""
+    return pd.DataFrame(rows, columns=COLUMNS)
