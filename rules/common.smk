@@ -169,6 +169,12 @@ RESPONSE = (
     else responses.NAMED[settings.sensors.response]
 )
 LESS = settings.light.less
+LESS_RAYS = {
+    "rays": LESS.rays,
+    "suns": LESS.suns,
+    "max_orders": settings.light.transport.max_orders,
+    "sun_diameter_deg": OF_BEAM["sun_diameter_deg"],
+}
 TRACING = settings.light.transport.model_dump() | OF_BEAM | {"response": RESPONSE}
 REFERENCE = OF_BEAM | {"variant": f"{VARIANT}_rgb", "response": RESPONSE}
 REFERENCE |= settings.light.timestep.model_dump(exclude={"step_min", "times_per_job"})

@@ -10,6 +10,7 @@ Makes   light/transport/{reconstruction}_{placement}.nc counted paths: any sky, 
         light/less_timesteps/{reconstruction}/{batch}.nc
         light/less/{reconstruction}.nc                  the same by LESS 3, another independent check
         light/ground_map.nc                             light on the ground at a few times
+        export/{reconstruction}/                        the scene for LESS 3 (`less3/`) and as glTF (`scene.glb`)
 """
 
 
@@ -101,12 +102,7 @@ rule less_timesteps:
         mem_mb=4000,
     params:
         engine={"bands": LESS.bands, "aperture_m": OF_BEAM["aperture_m"]},
-        rays={
-            "rays": LESS.rays,
-            "suns": LESS.suns,
-            "max_orders": settings.light.transport.max_orders,
-            "sun_diameter_deg": OF_BEAM["sun_diameter_deg"],
-        },
+        rays=LESS_RAYS,
         ground_z_m=GROUND_Z_M,
         sensor_table=SENSOR_TABLE,
         times=lambda wildcards: batch_of(
@@ -120,6 +116,41 @@ rule less_timesteps:
         said("LESS 3, {wildcards.reconstruction}, times {params.times}")
     script:
         "../scripts/less_timesteps.py"
+
+
+rule export_scene:
+    input:
+        leaves=lambda wildcards: leaf_geometry(wildcards)[:1],
+        wood=wood_mesh,
+        sky=results("sky/sky.nc"),
+        optics=results("sky/optics.nc"),
+        sensors=results("sky/sensors.csv"),
+        ground=GROUND,
+        shade=SHADE,
+        runner=beside_code("light/less_run.py"),
+        code=code("export_scene"),
+    output:
+        less=directory(results("export/{reconstruction}/less3")),
+        gltf=results("export/{reconstruction}/scene.glb"),
+    log:
+        logs("export_scene_{reconstruction}"),
+    benchmark:
+        benchmarks("export_scene_{reconstruction}")
+    conda:
+        "../envs/dapple.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+    params:
+        rays=LESS_RAYS,
+        aperture_m=OF_BEAM["aperture_m"],
+        ground_z_m=GROUND_Z_M,
+        sensor_table=SENSOR_TABLE,
+        seed=stream("export_scene"),
+    message:
+        said("{wildcards.reconstruction} for LESS 3 and as glTF")
+    script:
+        "../scripts/export_scene.py"
 
 
 rule less:

@@ -185,8 +185,9 @@ rule export:
             kind=["leaves", "wood"],
             axes=["less", "dart"],
         ),
+        expand(results("export/{name}/scene.glb"), name=LIT),
     message:
-        said("OBJ for LESS and DART")
+        said("OBJ for LESS 2 and DART, scenes for LESS 3 and as glTF")
 
 
 rule voxels_summary:

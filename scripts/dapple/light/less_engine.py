@@ -97,12 +97,12 @@ def in_groups(sky: xr.Dataset, optics: Optics, bands: int) -> tuple[xr.Dataset, 
     """Sky and optics in so many groups of like bands, in the order of their wavelengths."""
     if bands >= len(optics):
         return sky, optics
-    flux = {name: sky[name].transpose("time", "band").to_numpy() for name in FLUXES}
-    optics, group = group_bands(optics, *flux.values(), bands)
+    beam, diffuse = (sky[name].transpose("time", "band").to_numpy() for name in FLUXES)
+    optics, group = group_bands(optics, beam, diffuse, bands)
     order = np.argsort(optics.wavelength_nm, kind="stable")
     grouped = {
         name: (("time", "band"), group_flux(values, group, bands)[:, order])
-        for name, values in flux.items()
+        for name, values in zip(FLUXES, (beam, diffuse), strict=True)
     }
     return sky.drop_dims("band").assign(grouped), optics.each(lambda values: values[order])
 

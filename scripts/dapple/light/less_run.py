@@ -43,7 +43,7 @@ class Sky:
         radiance of the sky."""
         self.bands, self.beam, self.diffuse, self.radiance = bands, beam, diffuse, radiance
 
-    def surface_illumination(self, source: object, wavelengths: object) -> tuple[Any, ...]:
+    def surface_illumination(self, source: object, wavelengths: np.ndarray) -> tuple[Any, ...]:
         """As LESS asks: beam, diffuse, no coefficients of a model, and radiance by direction."""
         beam, level = (np.interp(wavelengths, self.bands, x) for x in (self.beam, self.diffuse))
         return beam, level, None, (level[:, None, None] * self.radiance).astype(np.float32)

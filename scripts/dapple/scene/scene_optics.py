@@ -1,6 +1,6 @@
 """Optical properties of all surfaces of a scene: from spectra or a file, in many bands or few."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
@@ -71,6 +71,10 @@ class Optics:
             There are no optics of that name.
         """
         return self._of(self.reflectance, name, "reflectance")
+
+    def reflectance_at(self, name: str, wavelength_nm: Sequence[float]) -> np.ndarray:
+        """(n,) reflectance of a surface at wavelengths [nm], linear between bands."""
+        return np.interp(wavelength_nm, self.wavelength_nm, self.reflectance_of(name))
 
     def transmittance_of(self, name: str) -> np.ndarray:
         """(b,) transmittance of a leaf; raises as `reflectance_of`."""
