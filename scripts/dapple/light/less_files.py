@@ -86,7 +86,7 @@ def write(
         `sensor`, `x_m`, `y_m`, `z_m` in the local frame.
     rays : LessRays
     aperture_m : float
-        Diameter of the sensors' receiving discs; a square of the same spread stands for it [m].
+        Diameter of the sensors' receiving discs [m].
 
     Raises
     ------
@@ -95,7 +95,7 @@ def write(
     """
     folder.mkdir(parents=True, exist_ok=True)
     size_m, corner_m = _around(scene)
-    seen_m = max(POINT_M, 0.5 * np.sqrt(3.0) * aperture_m)
+    seen_m = max(POINT_M, aperture_m)
     _write_obj(folder / "plate.obj", "plate", _square(2.0 * seen_m))
     objects = []
     for number, one in enumerate(scene.filled):

@@ -46,6 +46,8 @@ class Sky:
     def surface_illumination(self, source: object, wavelengths: np.ndarray) -> tuple[Any, ...]:
         """As LESS asks: beam, diffuse, no coefficients of a model, and radiance by direction."""
         beam, level = (np.interp(wavelengths, self.bands, x) for x in (self.beam, self.diffuse))
+        if np.ptp(self.radiance) == 0.0:  # an even sky is LESS' own, and faster
+            return beam, level, None, None
         return beam, level, None, (level[:, None, None] * self.radiance).astype(np.float32)
 
 
@@ -101,6 +103,20 @@ def build(folder: Path, facts: dict[str, Any], optics: dict[str, Any]) -> less.S
     plates.set_property("plate", less.Lambertian(reflectance=1.0))
     scene.add(plates, positions=table(folder / "sensors.csv", skip=1))
     return scene
+
+
+def in_disc(n_fine: int = 50) -> np.ndarray:
+    """(p,) weights of pixels, which see a square, for the mean over the disc in it."""
+    axis = (np.arange(PIXELS * n_fine) + 0.5) / (PIXELS * n_fine) - 0.5
+    inside = np.hypot(axis[:, None], axis) < 0.5
+    weight = inside.reshape(PIXELS, n_fine, PIXELS, n_fine).sum(axis=(1, 3)).ravel()
+    return weight / weight.sum()
+
+
+def mean_and_variance(pixels: np.ndarray) -> tuple[float, float]:
+    """Mean over a sensor's disc of what pixels (p,) see, and its variance."""
+    weight = in_disc()
+    return float(weight @ pixels), float(pixels.var(ddof=1) * (weight**2).sum())
 
 
 def seen(
@@ -183,19 +199,17 @@ def under_the_sun(
     straight, scattered = lit(angles, quality, rays["max_orders"])
     points = suns(*angles, rays["sun_diameter_deg"], rays["suns"], seed)
     if len(points) == 1:
-        return straight.mean(), scattered.mean(), error_squared(straight + scattered)
+        variance = mean_and_variance(straight + scattered)[1]
+        return mean_and_variance(straight)[0], mean_and_variance(scattered)[0], variance
     few = 1 if facts["voxels"] is None else quality // len(points)
     parts = np.zeros((len(points), PIXELS**2))
     for number, way in enumerate(points):
         if way[0] < 90.0:
             parts[number] = lit(way, few, 0)[0]
-    variance = error_squared(scattered) + error_squared(parts.mean(axis=0))
-    return parts.mean(), scattered.mean(), variance + error_squared(parts.mean(axis=1))
-
-
-def error_squared(values: np.ndarray) -> float:
-    """Variance of the mean of independent values."""
-    return float(values.var(ddof=1) / len(values))
+    of_sun = np.array([mean_and_variance(pixels)[0] for pixels in parts])
+    direct, spread = mean_and_variance(parts.mean(axis=0))
+    more, variance = mean_and_variance(scattered)
+    return direct, more, variance + spread + of_sun.var(ddof=1) / len(points)
 
 
 def main(folder: Path) -> None:
@@ -226,8 +240,9 @@ def main(folder: Path) -> None:
                 straight, more = seen(
                     scene, places[number], facts, bands, quality, rays["max_orders"]
                 )
-                from_sky, scattered = float(straight.mean()), scattered + float(more.mean())
-                variance += error_squared(straight + more)
+                from_sky = mean_and_variance(straight)[0]
+                scattered += mean_and_variance(more)[0]
+                variance += mean_and_variance(straight + more)[1]
             parts = (direct, from_sky, scattered)
             rows.append((time, label, sum(parts), *parts, float(np.sqrt(variance))))
     with (folder / "light.csv").open("w", newline="") as file:
