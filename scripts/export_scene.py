@@ -14,10 +14,7 @@ RED_GREEN_BLUE_NM = (650.0, 550.0, 450.0)
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
     optics = scene_optics.read(inputs.optics)
-    beside = {"ground": inputs.ground or params.ground_z_m, "shade": inputs.shade}
-    scenes, table = scene_files.read_with_sensors(
-        inputs.leaves, inputs.wood, inputs.sensors, **beside, where=params.sensor_table
-    )
+    scenes, table = scene_files.with_sensors(inputs, params)
     rays = LessRays(**params.rays, seed=params.seed)
     sky, folder = netcdf.read(inputs.sky), Path(snakemake.output.less)
     less_files.write(folder, scenes[0], optics, sky, table, rays, params.aperture_m)

@@ -9,10 +9,7 @@ from dapple.workflow import evenly, run
 
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
-    beside = {"ground": inputs.ground or params.ground_z_m, "shade": inputs.shade}
-    scenes, table = scene_files.read_with_sensors(
-        inputs.leaves, inputs.wood, inputs.sensors, **beside, where=params.sensor_table
-    )
+    scenes, table = scene_files.with_sensors(inputs, params)
     if params.most_sensors:
         table = table.iloc[evenly(len(table), params.most_sensors)]
     light = less_engine.series(

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -80,28 +81,20 @@ def read(leaves: Sequence[str], wood: str, beside: Around = LEVEL) -> list[Scene
     return scenes
 
 
-def read_with_sensors(
-    leaves: Sequence[str],
-    wood: str,
-    sensor_table: str,
-    *,
-    ground: str | float,
-    shade: str = "",
-    where: str = "",
-) -> tuple[list[Scene], pd.DataFrame]:
-    """What light meets (see `read`, `around`), and its sensors, none of which may lie in it.
+def with_sensors(inputs: Any, params: Any) -> tuple[list[Scene], pd.DataFrame]:
+    """What light meets, and the table of its sensors, none of which may lie in it.
 
     Parameters
     ----------
-    sensor_table : path
-        Table of sensors as the run has it.
-    where : str
-        What the user's table is called, for messages.
+    inputs, params
+        Of a rule: `leaves`, `wood`, `sensors`, `ground`, `shade`; `ground_z_m`, where there is no
+        surface of the ground, and `sensor_table`, the name of the user's table for messages.
     """
-    scenes = read(leaves, wood, around(ground, shade))
-    table = tables.read(sensor_table)
+    beside = around(inputs.ground or params.ground_z_m, inputs.shade)
+    scenes = read(inputs.leaves, inputs.wood, beside)
+    table = tables.read(inputs.sensors)
     for scene in scenes:
-        sensors.check(table, scene.filled, where=where)
+        sensors.check(table, scene.filled, where=params.sensor_table)
     return scenes, table
 
 
