@@ -41,6 +41,7 @@ if settings.source != "wood":
             **settings.polygons.model_dump(exclude={"voxel_size_m"}),
             voxel_size_m=lambda wildcards: float(wildcards.size),
             correction=None,
+            bracket=False,
             seed=stream("polygons"),
         message:
             said("polygons from {wildcards.size} m voxels")
@@ -111,7 +112,7 @@ if LIT:
                 "sun_kernel_deg", "sun_diameter_deg", "aperture_m", "response"
             ),
             orders=settings.tradeoff.max_orders,
-            polygon_size_m=settings.polygons.voxel_size_m,
+            polygon_size_m=settings.polygons.nominal_m,
             surfel_spacing_m=settings.surfels.spacing_m,
             timestep=REFERENCE,
             seed=stream("tradeoff"),

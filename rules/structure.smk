@@ -50,9 +50,10 @@ if settings.source != "wood":
                 if settings.corrections.occlusion
                 else None
             ),
+            bracket=True,
             seed=stream("polygons"),
         message:
-            said("polygons from {params.voxel_size_m} m voxels")
+            said("polygons, edge of the voxels [m]: {params.voxel_size_m}")
         script:
             "../scripts/polygons.py"
 

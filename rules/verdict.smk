@@ -43,8 +43,10 @@ rule verdict:
         mem_mb=4000,
     params:
         reconstructions=JUDGED,
-        polygon_voxel_m=(
-            settings.polygons.voxel_size_m if settings.source != "wood" else None
+        polygons=(
+            settings.polygons.model_dump(include={"voxel_size_m", "leaf_size_m"})
+            if settings.source != "wood"
+            else None
         ),
         ground_z_m=GROUND_Z_M,
         variant=f"{VARIANT}_mono",

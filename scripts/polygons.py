@@ -1,15 +1,15 @@
 """Reconstruct one planar polygon per voxel, separately for leaf and wood."""
 
-from dapple import steps
+from dapple import findings, steps
 from dapple.formats import clouds, json, meshes, voxel_grids
-from dapple.structure import occlusion, summary
+from dapple.structure import occlusion, polygon_sizes, summary
 from dapple.structure.voxel_data import as_estimated
 from dapple.workflow import options, run
 
 
 def main(snakemake):
     settings = options(snakemake.params)
-    correction = settings.pop("correction")
+    correction, is_bracketed = settings.pop("correction"), settings.pop("bracket")
     cloud = clouds.read(snakemake.input.cloud)
     made = steps.polygons(cloud, **settings)
     leaves = made["leaf"]
@@ -21,6 +21,17 @@ def main(snakemake):
     truth = json.read(snakemake.input.truth) if snakemake.input.truth else None
     facts = summary.of_meshes(leaves, made["wood"], truth)
     facts["n_added"] = leaves.n_elements - made["leaf"].n_elements
+    if is_bracketed:
+        leaf_m = cloud.xyz_m[cloud.attributes["Classification"] == clouds.LEAF]
+        used = polygon_sizes.resolved(leaf_m, settings)
+        areas = polygon_sizes.bracket(leaf_m, **used)
+        fit = polygon_sizes.resolved(leaf_m, settings | {"voxel_size_m": polygon_sizes.AUTO})
+        findings.say(polygon_sizes.doubts(areas, snakemake.input.cloud, fit["voxel_size_m"]))
+        facts |= {
+            "voxel_size_m": used["voxel_size_m"],
+            "fitting_voxel_size_m": fit["voxel_size_m"],
+            "leaf_area_m2_by_voxel_size_m": areas,
+        }
     json.write(snakemake.output.summary, facts)
 
 

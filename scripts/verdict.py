@@ -5,6 +5,7 @@ from pathlib import Path
 from dapple.formats import clouds, json, meshes, netcdf, shots, tables, voxel_grids
 from dapple.scene import scene_files, traced
 from dapple.stats import pairs
+from dapple.structure import polygon_sizes
 from dapple.structure.voxel_data import as_estimated
 from dapple.verdict import judgement, signals
 from dapple.verdict.run_data import RunData, points_per_polygon, with_light
@@ -27,7 +28,10 @@ def scanned(inputs, params):
     """Scan, points and reconstructions; what the run did not make stays empty."""
     cloud = clouds.read(inputs.cloud)
     leaves = meshes.read_ply(inputs.leaves[0]) if inputs.leaves else meshes.empty()
-    size_m = params.polygon_voxel_m
+    size_m = None
+    if params.polygons:
+        leaf_m = cloud.xyz_m[cloud.attributes["Classification"] == clouds.LEAF]
+        size_m = polygon_sizes.resolved(leaf_m, params.polygons)["voxel_size_m"]
     return RunData(
         shots=shots.read(inputs.shots) if inputs.shots else None,
         cloud=cloud,

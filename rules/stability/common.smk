@@ -34,7 +34,8 @@ def stability_setup():
         "clean": settings.clean.model_dump(exclude={"distance_points"})
         | {"pdal": settings.tools.pdal, "cloudcompare": settings.tools.cloudcompare},
         "classify": settings.classify.model_dump(),
-        "polygons": settings.polygons.model_dump(),
+        "polygons": settings.polygons.model_dump()
+        | {"voxel_size_m": settings.polygons.nominal_m},
         "surfels": SURFELS,
         "voxels": settings.voxels.model_dump(exclude={"sizes_m"}),
         "sizes_m": settings.voxels.sizes_m,

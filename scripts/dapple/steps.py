@@ -32,6 +32,7 @@ from dapple.scene.scene_optics import Optics
 from dapple.scene.surfaces import Scene, of_kinds
 from dapple.scene.traced import TracedScene
 from dapple.sky.open_sky import towards_sun
+from dapple.structure import polygon_sizes
 from dapple.structure import surfels as discs
 from dapple.structure.polygons import reconstruct
 from dapple.structure.returns import Kinds, kinds_by_place
@@ -48,7 +49,7 @@ def polygons(cloud: Cloud, *, seed: int, **settings: Any) -> dict[str, Mesh]:
         With `Classification`.
     seed : int
     **settings
-        Of `structure.polygons.reconstruct`.
+        Of `structure.polygons.reconstruct`, `voxel_size_m` perhaps "auto", and `leaf_size_m`.
 
     Returns
     -------
@@ -62,6 +63,7 @@ def polygons(cloud: Cloud, *, seed: int, **settings: Any) -> dict[str, Mesh]:
     """
     kinds = cloud.attributes["Classification"]
     leaf_m, wood_m = (cloud.xyz_m[kinds == kind] for kind in (LEAF, WOOD))
+    settings = polygon_sizes.resolved(leaf_m, settings)
     return {
         "leaf": reconstruct(leaf_m, what="leaf", seed=seed, **settings),
         "wood": reconstruct(wood_m, what="wood", seed=seed, **settings)

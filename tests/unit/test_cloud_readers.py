@@ -427,6 +427,19 @@ def test_units_in_a_header_are_turned_into_metres_with_a_word(tmp_path, unit, me
     assert len(source.notes) == 3
 
 
+@pytest.mark.parametrize(("row", "metres"), [("[m] [m] [m]", 1.0), ("mm mm mm", 1e-3)])
+def test_a_row_of_units_below_the_header_is_no_header(tmp_path, row, metres):
+    rows = "\n".join(" ".join(map(str, point)) for point in XYZ)
+    (tmp_path / "a.txt").write_text(f"Survey of May\nX Y Z\n{row}\n{rows}\n")
+    assert clouds.read(tmp_path / "a.txt").xyz_m == pytest.approx(XYZ * metres, abs=1e-9)
+
+
+def test_a_file_of_another_format_than_its_name_says_is_told_so(tmp_path):
+    path = las(tmp_path / "a.las").rename(tmp_path / "a.txt")
+    with pytest.raises(InputError, match=r"begins as LAS or LAZ does.*end in \.laz"):
+        clouds.read(path)
+
+
 def test_several_scans_in_one_pts_file_are_told_apart(tmp_path):
     (tmp_path / "a.pts").write_text("2\n1 2 3 -500 9 8 7\n4 5 6 -499 9 8 7\n1\n7 8 9 -498 9 8 7\n")
     cloud, source = clouds.read_with_source(tmp_path / "a.pts")

@@ -12,7 +12,7 @@ from dapple.formats import ground_surface
 from dapple.formats.cloud_raw import MISSED, Source
 from dapple.formats.clouds import Cloud
 from dapple.formats.ground_surface import GroundSurface
-from dapple.structure.polygon_sizes import spacing_m
+from dapple.structure.polygon_sizes import spacings_m
 
 SAMPLE = 20_000
 TALLEST_M = 130.0
@@ -65,7 +65,7 @@ def gather(cloud: Cloud, source: Source, *, ground_z_m: float | None) -> CloudFa
         above = above[:0]
     found, found_by = trees.trees_of(above, used)
     low, high = cloud.world_xyz_m.min(axis=0), cloud.world_xyz_m.max(axis=0)
-    spacing = spacing_m(cloud.xyz_m)
+    spacing, wider = spacings_m(cloud.xyz_m)
     numbers = {
         "points_in_file": source.in_file,
         "points": len(cloud),
@@ -77,6 +77,7 @@ def gather(cloud: Cloud, source: Source, *, ground_z_m: float | None) -> CloudFa
         "crs": source.crs,
         "step_m": step_m(cloud.xyz_m, source.step),
         "spacing_m": spacing,
+        "fourth_neighbour_m": wider,
         "points_per_m2": density_m2(cloud.xyz_m),
         "duplicates": int(selection.duplicates(cloud.xyz_m).sum()),
         "attributes": {name: _range(values) for name, values in cloud.attributes.items()},

@@ -146,18 +146,29 @@ def steps(facts: CloudFacts, settings: dict, path: str | Path) -> Iterator[Findi
 
 
 def spacing(facts: CloudFacts, settings: dict, path: str | Path) -> Iterator[Finding]:
-    """Polygons hold some points each."""
-    apart, size = facts.numbers["spacing_m"], settings["polygons"]["voxel_size_m"]
-    if "polygons" not in settings["reconstructions"] or not isinstance(size, float):
+    """Polygons hold some points each, and are no larger than they need be."""
+    numbers, section = facts.numbers, settings["polygons"]
+    apart, size = numbers["spacing_m"], section["voxel_size_m"]
+    if "polygons" not in settings["reconstructions"] or not np.isfinite(apart):
         return
-    if np.isfinite(apart) and apart > max(0.5 * size, facts.numbers["step_m"]):
-        fit = polygon_sizes.fitting(apart)
+    fit = polygon_sizes.fitting(apart, numbers["fourth_neighbour_m"], section["leaf_size_m"])
+    if size == polygon_sizes.AUTO:
+        said = f"polygons of {100 * fit['voxel_size_m']:g} cm fit the points"
+        if apart > 0.5 * fit["voxel_size_m"]:
+            said += (
+                f", which are {100 * apart:.1f} cm apart: too sparse for leaves of "
+                f"{100 * section['leaf_size_m']:g} cm, whose area is known to its order of "
+                "magnitude alone"
+            )
+        yield findings.note(path, said)
+    elif apart > max(0.5 * size, numbers["step_m"]):
         yield findings.warning(
             path,
             f"points {100 * apart:.1f} cm apart and polygons of {100 * size:g} cm",
             "polygons at least twice as large as the distance of the points",
-            "Most polygons would be made of one point or two, and their area means little.",
-            "polygons:\n" + "\n".join(f"  {key}: {value:g}" for key, value in fit.items()),
+            "Most polygons would be made of one point or two, and their area means little; "
+            f"{100 * fit['voxel_size_m']:g} cm fits.",
+            "polygons:\n  voxel_size_m: auto",
         )
 
 

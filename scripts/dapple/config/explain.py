@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import difflib
+import re
 
 from pydantic import BaseModel, ValidationError
 
 from dapple.errors import InputError
 
+ALTERNATIVE = re.compile(r"constrained-|literal\[")
 REMEDIES = {
     "string_type": "Put the value in quotes: YAML takes 3_7 for a number and `no` for false.",
 }
@@ -27,7 +29,9 @@ def explain(error: ValidationError, settings: type[BaseModel], where: str) -> In
     complaints = error.errors()
     unknown = [one for one in complaints if one["type"] == "extra_forbidden"]
     first = (unknown or complaints)[0]
-    key = ".".join(str(part) for part in first["loc"])
+    # Of a key that takes a number or a word pydantic also says which of them failed.
+    parts = [str(part) for part in first["loc"]]
+    key = ".".join(part for part in parts if not ALTERNATIVE.match(part))
     if unknown:
         return InputError(
             where,

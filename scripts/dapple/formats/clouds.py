@@ -22,6 +22,15 @@ READERS = {
     ".ptx": cloud_ptx.read,
     **dict.fromkeys((".txt", ".xyz", ".csv", ".asc", ".pts"), cloud_text.read),
 }
+SIGNATURES: dict[bytes, tuple[str, tuple[str, ...]]] = {
+    b"LASF": ("LAS or LAZ", (".laz", ".las")),
+    b"ASTM-E57": ("E57", (".e57",)),
+    b"ply\n": ("PLY", (".ply",)),
+    b"ply\r": ("PLY", (".ply",)),
+    b"\x1f\x8b": ("a gzip archive", ()),
+    b"PK\x03\x04": ("a zip archive", ()),
+}
+"""Formats by their first bytes, and the suffixes that they have."""
 FIRED = {
     ".ply": cloud_ply.read_fired,
     **dict.fromkeys((".txt", ".xyz", ".csv"), cloud_text.read_fired),
@@ -100,6 +109,7 @@ def read_with_source(path: str | Path) -> tuple[Cloud, Source]:
     path = Path(path)
     reader = _by_suffix(path, READERS, "read")
     _exists(path)
+    _is_what_it_is_called(path)
     raw = reader(path)
     return _to_cloud(path, raw), raw.source
 
@@ -198,6 +208,18 @@ def _exists(path: Path) -> None:
         raise InputError(
             path, "an empty file (0 bytes)", "a point cloud", "Copy or export the file again."
         )
+
+
+def _is_what_it_is_called(path: Path) -> None:
+    """The first bytes are not those of another format than the suffix says."""
+    with path.open("rb") as file:
+        head = file.read(8)
+    for start, (kind, suffixes) in SIGNATURES.items():
+        if head.startswith(start) and path.suffix.lower() not in suffixes:
+            remedy = f"Rename it to end in {suffixes[0]}." if suffixes else "Unpack it first."
+            raise InputError(
+                path, f"a file that begins as {kind} does", f"the format of '{path.suffix}'", remedy
+            )
 
 
 def _to_cloud(path: Path, raw: RawCloud) -> Cloud:

@@ -168,17 +168,33 @@ def _names(
 ) -> tuple[tuple[str, ...], tuple[str, ...] | None]:
     """Names of the columns: those of a header among the lines before the first row, or numbers."""
     width = len(words)
+    units: tuple[str, ...] = ()
     for line in reversed(before):
         text = line.strip().lstrip(MARKS)
         if not text or re.fullmatch(r"\d+", text):
             continue
         if _has_axes(text):
             names = _header_words(text, separator, width)
+            names = tuple(
+                f"{name} [{units[k]}]" if k < len(units) and units[k] and axis(name) else name
+                for k, name in enumerate(names)
+            )
             return _unique(names, width, words), names
         fields = _split(text, separator)
+        if bare := _unit_row(fields):
+            units = bare
+            continue
         if len(fields) == width and not line.lstrip().startswith(tuple(MARKS[:4])):
             raise no_table(path, f"the columns '{text[:80]}'")
     return ("X", "Y", "Z", *(f"column_{k}" for k in range(4, width + 1))), None
+
+
+def _unit_row(fields: list[str]) -> tuple[str, ...]:
+    """Units of the columns where a line holds nothing but such, as `[m] [m] [m] [dB]`; else ()."""
+    bare = tuple(re.sub(r"[\[\]()]", "", field).strip().lower() for field in fields)
+    lengths = [unit for unit in bare if unit and unit in UNITS]
+    are_units = len(lengths) >= 3 and all(len(unit) <= 6 and not unit.isdigit() for unit in bare)
+    return bare if are_units else ()
 
 
 def _header_words(text: str, separator: str, width: int) -> tuple[str, ...]:
