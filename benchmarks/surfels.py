@@ -9,6 +9,7 @@ were chosen on trees of other seeds (docs/data/surfels.csv).
 """
 
 import argparse
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,6 +17,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pandas as pd
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
 from dapple import steps
 from dapple.clock import time_range
@@ -32,7 +35,7 @@ from dapple.structure.stem import stem_position
 from dapple.virtual import scanner
 from dapple.virtual.plants import apple_tree
 
-TOLERANCE, MOST_RAYS = 0.005, 4096
+TOLERANCE, MOST_RAYS = 0.01, 4096
 """Of the share of the sun's disc, and rays for it."""
 LIT, SHADED = 0.95, 0.05
 

@@ -8,7 +8,8 @@ from dapple.errors import EmptyCloudError
 from dapple.formats.shots import Shots
 from dapple.structure import shot_evidence, surfels
 
-SETTINGS = Surfels().model_dump() | {"max_deviation": 15.0, "seed": 1}
+THIN = {"beam_diameter_m": 0.0, "beam_divergence_mrad": 0.0}
+SETTINGS = Surfels().model_dump() | THIN | {"max_deviation": 15.0, "seed": 1}
 SCANNER_M = np.array([0.0, 0.0, 4.0])
 EDGE_M = 0.4
 
@@ -112,18 +113,36 @@ def test_a_scanner_that_moves_tells_nothing_and_the_facts_say_so():
     assert not rebuilt(sheet(), shots)[1]["with_shots"]
 
 
+def test_a_beam_that_passed_was_clear_of_leaves_all_across():
+    """Beams of 2 cm at half of the square: they end beside it too, and pass farther away."""
+    points, thick = sheet(), {"beam_diameter_m": 0.02, "beam_divergence_mrad": 0.0}
+    reach_m = 0.01 * surfels.BEAM_SHARE
+    line = np.arange(-EDGE_M / 2, EDGE_M / 2, 0.004) + 0.002
+    is_hit = np.repeat(line < reach_m, len(line)).reshape(len(line), -1).T.ravel()
+    shots = shots_down(lambda k: (0.0,) if is_hit[k] else ())
+    seen = points[points[:, 0] < reach_m]
+    area = {
+        name: rebuilt(seen, shots, spacing_m=0.005, **beam)[0].area_m2
+        for name, beam in (("thin", THIN), ("thick", thick))
+    }
+    beyond = np.mean(seen[:, 0] > 0)
+    assert 0.5 * beyond < 1 - area["thick"] / area["thin"] < 2 * beyond
+
+
 def test_all_shots_that_meet_a_disc_are_found():
     shots = shots_down(lambda k: (0.0,), position_m=np.array([2.0, -3.0, 1.5]))
     index = shot_evidence.build([shots], 15.0)
-    centre, normal = np.array([[0.05, 0.02, 0.0]]), np.array([[0.1, -0.2, 1.0]])
+    centre, normal = np.array([0.05, 0.02, 0.0]), np.array([0.1, -0.2, 1.0])
     normal /= np.linalg.norm(normal)
-    _, count = shot_evidence.hit_shares(index.arrays, centre, normal, np.array([0.03]), 1.0)
+    u, v, out = np.empty(3), np.empty(3), np.empty((999, 6))
+    shot_evidence.axes_in(normal, u, v)
+    count = shot_evidence.gather(index.arrays, centre, normal, u, v, 0.03, 1.0, out)
     to = centre - shots.origin_m
-    t = (to @ normal[0]) / (shots.direction @ normal[0])
+    t = (to @ normal) / (shots.direction @ normal)
     met = shots.origin_m + t[:, None] * shots.direction
     expected = (np.linalg.norm(met - centre, axis=1) < 0.03).sum()
     assert expected > 30
-    assert abs(count[0] - expected) <= 1  # directions are kept in single precision
+    assert abs(count - expected) <= 1  # directions are kept in single precision
 
 
 def test_points_alone_have_discs_turned_by_chance():

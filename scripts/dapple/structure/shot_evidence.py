@@ -17,6 +17,10 @@ CELL_STEPS = 2.0
 """Edge of the cells in which shots are kept by direction, in steps between shots."""
 LEAST_COSINE = 0.05
 """Shots nearer to the plane say nothing about places in it."""
+REACH_WIDTHS = 2.0
+"""Shots farther away, in widths of the distribution by which they count, do not count."""
+FAR_M = 30.0
+"""Beams are looked for as wide as they are at this distance [m]."""
 MIXED_REACH_M = 0.5
 """A return mixed of several targets has them within this distance."""
 
@@ -250,38 +254,52 @@ def axes_in(normal, u, v):
 
 
 @njit(cache=True, parallel=True)
-def hit_shares(index, centre, normal, radius, tolerance, most=512):
-    """Share of the shots through each disc that ended at it.
+def hit_shares(index, centre, normal, width, tolerance, beam, most=1024):
+    """Share of hits among the shots around each place on its plane.
+
+    Shots count by a normal distribution of their distance from the place. A beam ends at a target
+    that its edge touches and passes only where all of it passes: passages count from the edge of
+    the beam, and from once more its radius because hits reach as far beyond their target.
 
     Parameters
     ----------
     index : tuple
         `ShotIndex.arrays`.
     centre, normal : (n, 3) float64
-    radius : (n,) float64
-        [m]
+    width : (n,) float64
+        Standard deviation of that distribution [m].
     tolerance : float
         Returns this near to the plane are of it [m].
+    beam : (2,) float64
+        Radius of the beam within which a target ends it: at the exit [m], and growth per metre.
     most : int
-        Shots that are looked at for one disc.
+        Shots that are looked at for one place.
 
     Returns
     -------
     share : (n,) float64
         NaN where no shot says anything.
-    count : (n,) int64
-        Shots that do.
+    weight : (n,) float64
+        Sum of the weights of shots.
     """
-    share, count = np.full(len(centre), np.nan), np.zeros(len(centre), np.int64)
+    share, weight = np.full(len(centre), np.nan), np.zeros(len(centre))
     for i in prange(len(centre)):
         out, u, v = np.empty((most, 6)), np.empty(3), np.empty(3)
         axes_in(normal[i], u, v)
-        made = gather(index, centre[i], normal[i], u, v, radius[i], tolerance, out)
+        reach = REACH_WIDTHS * width[i] + 2.0 * (beam[0] + beam[1] * FAR_M)
+        made = gather(index, centre[i], normal[i], u, v, reach, tolerance, out)
         hit, total = 0.0, 0.0
         for e in range(made):
-            total += out[e, WEIGHT]
-            hit += out[e, WEIGHT] * out[e, KIND]
+            away = math.sqrt(out[e, U] ** 2 + out[e, V] ** 2)
+            if out[e, KIND] == PASSED:
+                edge = (beam[0] + beam[1] * out[e, RANGE]) / math.sqrt(out[e, COSINE])
+                away = max(away - 2.0 * edge, 0.0)
+            if away > REACH_WIDTHS * width[i]:
+                continue
+            seen = out[e, WEIGHT] * math.exp(-0.5 * (away / width[i]) ** 2)
+            total += seen
+            hit += seen * out[e, KIND]
         if total > 0.0:
             share[i] = hit / total
-        count[i] = made
-    return share, count
+        weight[i] = total
+    return share, weight

@@ -13,6 +13,8 @@ from dapple.structure import local_planes, shot_evidence
 
 NEIGHBOURS = 30
 """Points around a point that its plane is fitted to, at most."""
+LEAST_REACH_NOISES, LARGEST_REACH_M = 5.0, 0.05
+"""Bounds of the distance within which a point's surface is looked for."""
 RING = 6
 """The distance of so many neighbours on its surface tells how large a point's share of it is."""
 AGREEMENT_NOISES = 2.0
@@ -21,9 +23,13 @@ ON_SURFACE_NOISES = 2.0
 """Points this near to a plane, in the same, are on its surface."""
 HIT_NOISES = 3.0
 """Returns this near to a disc, in the same, end at it."""
+WIDTH = 0.5
+"""Standard deviation of the distance within which shots tell of a disc, in its radii."""
+BEAM_SHARE = 0.5
+"""A target must reach this far into the beam to end it, as a share of the beam's radius."""
 LARGEST = 1.5
 """Largest radius, in medians of all radii: points that stand alone say little of an area."""
-SIDES = 6
+SIDES = 4
 """Of the polygons that discs are drawn as, equal in area."""
 
 
@@ -31,10 +37,12 @@ def reconstruct(
     points_m: np.ndarray,
     shots: Iterable[Shots] | None,
     *,
-    reach_m: float,
+    reach_spacings: float,
     noise_m: float,
     spacing_m: float,
     overlap: float,
+    beam_diameter_m: float,
+    beam_divergence_mrad: float,
     max_deviation: float,
     seed: int,
 ) -> tuple[Mesh, dict[str, Any]]:
@@ -42,8 +50,9 @@ def reconstruct(
 
     Points are drawn onto planes that the points around them agree on, and thinned. A disc is as
     large as the point's share of the surface, times `overlap`. Where shots are known, its area is
-    multiplied by the share of the shots through it that ended at it: what later returns and misses
-    passed is open. Without shots the distance of points alone decides, and facts say so.
+    multiplied by the share of the shots around it that ended at it: what later returns and misses
+    passed is open, and a beam that passed was clear of targets all across. Without shots the
+    distance of points alone decides, and facts say so.
 
     Parameters
     ----------
@@ -51,14 +60,18 @@ def reconstruct(
         Leaf points in the local frame [m].
     shots : iterable of Shots or None
         The whole scan in the same frame, misses included.
-    reach_m : float
-        Farthest points that tell of a point's surface [m].
+    reach_spacings : float
+        Farthest points that tell of a point's surface, in median distances of nearest points.
     noise_m : float
         Standard deviation of points across their surface [m].
     spacing_m : float
         Of the thinned points [m].
     overlap : float
         Area of a disc over the point's share of the surface: discs that leave no gaps overlap.
+    beam_diameter_m : float
+        Of the beam at the scanner [m].
+    beam_divergence_mrad : float
+        Full angle of the beam [mrad].
     max_deviation : float
         Returns at or above are mixed of several targets, and what is near them is not known.
     seed : int
@@ -69,9 +82,9 @@ def reconstruct(
     leaves : Mesh
         One element a disc.
     facts : dict
-        `point_spacing_m` (median, of the thinned points), `with_shots`, `without_surface` (share
-        of discs whose direction is chance), `shots_per_disc` and `hit_share` (means; None without
-        shots).
+        `reach_m`, `point_spacing_m` (median, of the thinned points), `with_shots`,
+        `without_surface` (share of discs whose direction is chance), `shots_per_disc` (sum of
+        their weights) and `hit_share` (means; None without shots).
 
     Raises
     ------
@@ -83,6 +96,7 @@ def reconstruct(
         raise EmptyCloudError(
             "surfels", "no leaf points in the cloud", "at least one", "Check the classes."
         )
+    reach_m = _reach_m(points_m, reach_spacings, noise_m)
     index, distance = local_planes.neighbours(points_m, NEIGHBOURS, reach_m)
     width_m = AGREEMENT_NOISES * noise_m
     normal, offset, support = local_planes.fit(points_m, index, distance, reach_m, width_m)
@@ -96,6 +110,7 @@ def reconstruct(
     radius *= np.sqrt(overlap)
     known = None if shots is None else shot_evidence.build(shots, max_deviation)
     facts = {
+        "reach_m": reach_m,
         "point_spacing_m": float(np.median(radius) * np.sqrt(np.pi / overlap)),
         "with_shots": known is not None,
         "without_surface": float(is_alone.mean()),
@@ -103,15 +118,23 @@ def reconstruct(
         "hit_share": None,
     }
     if known is not None:
-        share, count = shot_evidence.hit_shares(
-            known.arrays, centre, normal, radius, HIT_NOISES * noise_m
+        beam = np.array([beam_diameter_m, 1e-3 * beam_divergence_mrad]) * 0.5 * BEAM_SHARE
+        share, weight = shot_evidence.hit_shares(
+            known.arrays, centre, normal, WIDTH * radius, HIT_NOISES * noise_m, beam
         )
         share = np.where(np.isnan(share), 1.0, share)
-        facts |= {"shots_per_disc": float(count.mean()), "hit_share": float(share.mean())}
+        facts |= {"shots_per_disc": float(weight.mean()), "hit_share": float(share.mean())}
         radius *= np.sqrt(share)
     is_there = radius > 0
     discs = np.column_stack([radius, centre, normal])[is_there]
     return meshes.of_discs(discs, SIDES), facts
+
+
+def _reach_m(points_m: np.ndarray, spacings: float, noise_m: float) -> float:
+    """How far the surface of a point is looked for: farther than noise, not farther than leaves."""
+    _, nearest_m = local_planes.neighbours(points_m, 1, LARGEST_REACH_M)
+    usual_m = float(np.median(nearest_m))
+    return min(max(spacings * usual_m, LEAST_REACH_NOISES * noise_m), LARGEST_REACH_M)
 
 
 def _thinned(points_m: np.ndarray, support: np.ndarray, spacing_m: float) -> np.ndarray:
