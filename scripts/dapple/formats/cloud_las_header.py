@@ -140,6 +140,8 @@ def _records(
     length_format = "<H" if head_bytes == RECORD_HEAD else "<Q"
     at = start
     for number in range(announced):
+        if not 0 <= at <= end:
+            raise _wrong(path, f"records announced at byte {at:,}")
         handle.seek(at)
         head = handle.read(head_bytes)
         length = struct.unpack_from(length_format, head, 20)[0] if len(head) == head_bytes else 0

@@ -119,7 +119,7 @@ def _without_counts(table: pd.DataFrame) -> tuple[pd.DataFrame, np.ndarray | Non
     rows = np.flatnonzero(alone)
     if not len(rows):
         return table, None
-    announced = pd.to_numeric(table.iloc[rows, 0], errors="coerce").to_numpy()
+    announced = as_numbers(table.iloc[rows, 0]).to_numpy()
     follow = np.diff(rows, append=len(table)) - 1
     if not np.array_equal(announced, follow):
         return table, None  # points that lack coordinates, and not counts
@@ -139,10 +139,18 @@ def _axes(path: Path, layout: Layout) -> tuple[list[str], np.ndarray, bool]:
     return order, factor, degrees
 
 
+def as_numbers(column: pd.Series) -> pd.Series:
+    """Numbers of a column of text, NaN for what is none; whole numbers may be of any length."""
+    try:
+        return pd.to_numeric(column, errors="coerce")
+    except OverflowError:
+        return pd.to_numeric(column.astype(str), errors="coerce").astype(float)
+
+
 def _numbers(path: Path, column: pd.Series, layout: Layout) -> np.ndarray:
     if column.dtype.kind in "iufb":
         return column.to_numpy(float)
-    numbers = pd.to_numeric(column, errors="coerce")
+    numbers = as_numbers(column)
     bad = np.flatnonzero((numbers.isna() & column.notna()).to_numpy())
     if len(bad):
         row = int(bad[0])
@@ -157,7 +165,7 @@ def _attribute(column: pd.Series, name: str, notes: list[str]) -> np.ndarray | N
         return None
     if column.dtype.kind in "iufb":
         return column.to_numpy()
-    numbers = pd.to_numeric(column, errors="coerce")
+    numbers = as_numbers(column)
     bad = np.flatnonzero((numbers.isna() & column.notna()).to_numpy())
     if not len(bad):
         return numbers.to_numpy()

@@ -139,6 +139,8 @@ def read(
             path,
             f"a truncated file: {max(left, 0):,} bytes for {element.count:,} {element.name} rows",
         )
+    if not element.properties:
+        return {}
     if not form:
         return _ascii(path, handle, element)
     if element.has_lists:

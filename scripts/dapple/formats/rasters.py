@@ -88,7 +88,7 @@ def read(path: str | Path) -> Raster:
             bands = tuple(
                 text or str(number) for number, text in enumerate(file.descriptions, start=1)
             )
-    except rasterio.errors.RasterioError as error:
+    except (rasterio.errors.RasterioError, UnicodeDecodeError) as error:
         raise InputError(
             path, f"no readable raster ({error})", "a GeoTIFF", "Copy or export the file again."
         ) from error

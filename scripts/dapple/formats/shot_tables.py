@@ -1,5 +1,6 @@
 """Tables of shots as other programs write them: AMAPVox's text, and the pulses of HELIOS++."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +39,8 @@ def read_amapvox(path: Path) -> Fired:
     table.columns = [str(name).lower().strip('"') for name in table.columns]
     direction = table[list(DIRECTION)].to_numpy(float)
     ranges = sorted(
-        (name for name in table.columns if name.startswith("range")), key=lambda n: int(n[5:] or 0)
+        (name for name in table.columns if re.fullmatch(r"range\d{0,6}", name)),
+        key=lambda n: int(n[5:] or 0),
     )
     range_m = np.array(table[ranges], float)
     if EMPTY in table:

@@ -179,6 +179,12 @@ def _pvgis(path: Path, lines: Sequence[str]) -> Table | None:
     table = build(path, lines[:end], header=header, delimiter=",", layout="PVGIS")
     time = str(table.cells.columns[0])
     facts: dict[str, Any] = {"timezone": "UTC", "interval_min": 0.0}
+    beam = "Gb(i)" in table.cells and "Gd(i)" in table.cells
+    if not beam and not {"G(h)", "G(i)"} & set(table.cells):
+        raise InputError(
+            path, f"columns {', '.join(table.cells)}", "G(h), G(i), or Gb(i) and Gd(i)",
+            "Download it again.",
+        )  # fmt: skip
     if "G(h)" in table.cells:
         known = _there(table, **{"global": "G(h)", "diffuse": "Gd(h)"})
         return replace(table, units=dict.fromkeys(known.values(), "W/m2"),
@@ -190,7 +196,7 @@ def _pvgis(path: Path, lines: Sequence[str]) -> Table | None:
             "Download it with slope 0.",
         )  # fmt: skip
     cells = table.cells
-    if "Gb(i)" in cells:
+    if beam:
         parts = (pd.to_numeric(cells[name], errors="coerce") for name in ("Gb(i)", "Gd(i)"))
         total = sum(parts).round(6)
         cells = cells.assign(**{"G(i)": total.astype(str)})

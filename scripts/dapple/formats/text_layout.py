@@ -174,7 +174,7 @@ def _names(
         if not text or re.fullmatch(r"\d+", text):
             continue
         if _has_axes(text):
-            names = _header_words(text, separator, width)
+            names = _header_words(path, text, separator, width)
             names = tuple(
                 f"{name} [{units[k]}]" if k < len(units) and units[k] and axis(name) else name
                 for k, name in enumerate(names)
@@ -197,12 +197,15 @@ def _unit_row(fields: list[str]) -> tuple[str, ...]:
     return bare if are_units else ()
 
 
-def _header_words(text: str, separator: str, width: int) -> tuple[str, ...]:
+def _header_words(path: Path, text: str, separator: str, width: int) -> tuple[str, ...]:
     """Names of a header, which may be separated in another way than the rows."""
     options = [tuple(_split(text, one)) for one in (separator, ";", ",", "\t", r"\s+")]
     options = [words for words in options if _axes_of(words) == {0, 1, 2}]
     # The way that gives as many names as there are fields, else the first that has the axes.
-    return next((words for words in options if len(words) == width), options[0])
+    fitting = [words for words in options if len(words) == width] or options
+    if not fitting:
+        raise no_table(path, f"the columns '{text[:80]}'")
+    return fitting[0]
 
 
 def _unique(names: tuple[str, ...], width: int, words: list[str]) -> tuple[str, ...]:

@@ -115,7 +115,7 @@ def read(
             offsets = np.array([file.offsets[k - 1] for k in chosen])
             is_integer = np.issubdtype(file.dtypes[chosen[0] - 1], np.integer)
             is_warped = not _fits(file, target)
-    except rasterio.errors.RasterioError as error:
+    except (rasterio.errors.RasterioError, UnicodeDecodeError) as error:
         raise InputError(
             path, f"no readable raster ({error})", "a GeoTIFF", "Copy or export the file again."
         ) from error
@@ -246,6 +246,11 @@ def _square(warped: WarpedVRT) -> dict[str, Any]:
     """The grid that warping gives, with the finer edge of its pixels for both."""
     grid = warped.transform
     pixel_m = min(grid.a, -grid.e)
+    if not 0 < pixel_m < np.inf or not np.isfinite(grid).all():
+        raise InputError(
+            warped.name, f"pixels of {pixel_m:g} m", "pixels with a size",
+            "Check the georeference of the images.",
+        )  # fmt: skip
     return {
         "transform": Affine(pixel_m, 0.0, grid.c, 0.0, -pixel_m, grid.f),
         "width": int(np.ceil(round(warped.width * grid.a / pixel_m, 6))),

@@ -202,7 +202,7 @@ def _open(path: Path, layer: str) -> geopandas.GeoDataFrame:
             # judged here.
             warnings.simplefilter("ignore", RuntimeWarning)
             found = pyogrio.read_dataframe(path, layer=layer or None, on_invalid="fix")
-    except (pyogrio.errors.DataSourceError, shapely.errors.GEOSException) as error:
+    except (pyogrio.errors.DataSourceError, shapely.errors.GEOSException, ValueError) as error:
         raise InputError(
             path,
             f"nothing that GDAL reads ({error})",
@@ -267,7 +267,10 @@ def _polygons(
 
 def _only_polygons(shape: shapely.Geometry) -> shapely.Geometry | None:
     """The polygons of any shape, or None."""
-    parts = shapely.get_parts(shape if shape.is_valid else shapely.make_valid(shape))
+    try:
+        parts = shapely.get_parts(shape if shape.is_valid else shapely.make_valid(shape))
+    except shapely.errors.GEOSException:  # corners so far apart that they cannot be told
+        return None
     while any(part.geom_type == "GeometryCollection" for part in parts):
         parts = np.concatenate([shapely.get_parts(part) for part in parts])
     areas = [part for part in parts if part.geom_type in ("Polygon", "MultiPolygon")]

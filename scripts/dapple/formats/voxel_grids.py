@@ -150,8 +150,9 @@ def read_vox(path: str | Path) -> xr.Dataset:
     at = np.ravel_multi_index(index, shape)
     data = {}
     for name in table.columns.difference(["i", "j", "k"]):
-        values = np.empty(len(table), table[name].dtype)
-        values[at] = table[name]
+        known = table[name].to_numpy()
+        values = np.empty(len(table), known.dtype)
+        values[at] = known
         new = "plant_area_density_m2_m3" if name == "PadBVTotal" else str(name)
         data[new] = (("x", "y", "z"), values.reshape(shape))
     coords = {a: corner[k] + (np.arange(shape[k]) + 0.5) * size[k] for k, a in enumerate("xyz")}

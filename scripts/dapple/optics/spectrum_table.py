@@ -91,10 +91,10 @@ def read(
     wavelength, unit = _numbers(source, at_name)
     if unit.lower() in MICROMETRES or at_name.lower().endswith("_um"):
         wavelength = 1e3 * wavelength
-    elif np.nanmax(wavelength) < 30.0:
+    elif np.max(wavelength, initial=-np.inf, where=np.isfinite(wavelength)) < 30.0:
         raise InputError(
             f"{path}, column {at_name!r}",
-            f"wavelengths up to {np.nanmax(wavelength):g}",
+            f"wavelengths up to {np.max(wavelength, initial=0.0, where=wavelength > 0):g}",
             "nanometres",
             "Call the column wavelength_um if it is in micrometres.",
         )

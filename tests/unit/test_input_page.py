@@ -1,0 +1,109 @@
+"""Each row of the page on input is true: the format is built, and what the page writes reads it."""
+
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+import rasterio
+import yaml
+from rasterio.transform import from_origin
+
+from dapple.code_use import SCRIPTS
+from dapple.config.settings import validate
+from dapple.formats import user_rasters
+from dapple.optics.cameras import CAMERAS, camera
+from dapple.sky import radiation_table
+from dapple.stats import measured
+
+PAGE = SCRIPTS.parent / "docs" / "input.md"
+ROW = re.compile(r"^\| (?P<have>[^|]+?) \| `(?P<write>(?:radiation|measured|chlorophyll): .+)` \|$")
+ROWS = {m["have"]: m["write"] for line in PAGE.read_text().splitlines() if (m := ROW.match(line))}
+HOUR = pd.Timestamp("2023-08-10 10:00", tz="UTC")
+"""Of the first value, as the format's stamp means it."""
+
+TABLES = {
+    "Campbell TOA5": '"TOA5","a","CR1000","1","x","y","z","T"\n"TIMESTAMP","RECORD","SlrW_Avg"\n'
+    '"TS","RN","W/m^2"\n"","","Avg"\n"2023-08-10 11:00:00",1,500\n"2023-08-10 11:10:00",2,510\n'
+    '"2023-08-10 11:20:00",3,"NAN"\n',
+    "DWD ten-minute radiation": "STATIONS_ID;MESS_DATUM;QN;DS_10;GS_10;SD_10;LS_10;eor\n"
+    "1443;202308101000;3;6;30;0.1;-999;eor\n1443;202308101010;3;-999;-999;0.1;-999;eor\n",
+    "DWD hourly radiation": "STATIONS_ID;MESS_DATUM;QN_592;ATMO_LBERG;FD_LBERG;FG_LBERG;SD_LBERG;"
+    "ZENIT;MESS_DATUM_WOZ;eor\n1443;2023081010:00;1;100;36;180;60;40;2023081010:30;eor\n",
+    "BSRN from PANGAEA": "/* DATA DESCRIPTION:\n*/\nDate/Time\tSWD [W/m**2]\tDIF [W/m**2]\n"
+    "2023-08-10T10:00\t500\t100\n2023-08-10T10:01\t501\t100\n",
+    "NSRDB": "Source,Location ID,Time Zone\nNSRDB,1,-5\nYear,Month,Day,Hour,Minute,GHI,DHI\n"
+    "2023,8,10,5,0,500,100\n2023,8,10,5,30,510,100\n",
+    "PVGIS hourly, slope 0": "Latitude (decimal degrees):\t48\nSlope: 0 deg.\ntime,Gb(i),Gd(i)\n"
+    "20230810:1000,400,100\n20230810:1100,410,100\n\nGb(i): beam\n",
+    "FLUXNET or ICOS": "TIMESTAMP_START,TIMESTAMP_END,SW_IN\n202308101100,202308101130,500\n"
+    "202308101130,202308101200,-9999\n",
+    "CAMS radiation service": "# Coding: utf-8\n# Observation period;GHI;DHI\n"
+    "2023-08-10T10:00:00.0/2023-08-10T10:15:00.0;125;25\n",
+    "Solcast": "Ghi,Dhi,PeriodEnd,PeriodStart,Period\n"
+    "500,100,2023-08-10T10:00:00Z,2023-08-10T09:30:00Z,PT30M\n",
+    "Open-Meteo": "latitude,longitude,elevation,utc_offset_seconds,timezone\n48,8,1,0,GMT\n\n"
+    "time,shortwave_radiation (W/m²)\n2023-08-10T10:00,500\n2023-08-10T11:00,510\n",
+    "CSV of a spreadsheet, day and clock apart": "Datum;Uhrzeit;Globalstrahlung [W/m²]\n"
+    "10.08.2023;12:00;500,0\n10.08.2023;12:10;1.001,5\n",
+}
+RECORDS = {
+    "HOBO export": ("logger_3_7.csv", '"Plot Title: a"\n"#","Date Time, GMT+02:00","PAR, uE"\n'
+                    "1,08/10/23 12:00:00 PM,500\n2,08/10/23 12:01:00 PM,501\n"),
+    "a column for each sensor": ("wide.csv", "TIMESTAMP,PAR_3_7_Avg,PAR_3_7_Std,PAR_3_8_Avg\n"
+                                 "2023-08-10 10:00,500,3,600\n2023-08-10 10:01,501,3,601\n"),
+}  # fmt: skip
+IMAGES = {
+    "MicaSense RedEdge-MX, 16 bits": ("uint16", 32768),
+    "Phantom 4 Multispectral, reflectance": ("float32", 1),
+    "bands as Sentinel-2 has them, 0 to 10,000": ("uint16", 10_000),
+}
+
+
+def written(have):
+    """The settings of a row on top of the defaults."""
+    return validate(yaml.safe_load(ROWS[have].replace("kind: table", "kind: table, path: a.csv")))
+
+
+def test_every_row_is_tested_and_there_are_twelve_at_least():
+    assert set(ROWS) == {*TABLES, *RECORDS, *IMAGES}
+    assert len(ROWS) >= 12
+
+
+@pytest.mark.parametrize("have", TABLES)
+def test_radiation_is_read_in_its_unit_and_zone(have, tmp_path):
+    (tmp_path / "a.csv").write_text(TABLES[have], encoding="utf-8")
+    section = written(have).radiation
+    columns = {key: getattr(section, key) for key in ("global_column", "diffuse_column")}
+    declared = section.model_dump(include=set(radiation_table.Declared.__dataclass_fields__))
+    found = radiation_table.read(tmp_path / "a.csv", **columns, **declared)
+    assert found.table.index[0] == HOUR
+    assert found.table["global_w_m2"].iloc[0] == pytest.approx(500.0)
+
+
+@pytest.mark.parametrize("have", RECORDS)
+def test_records_are_read_by_sensor(have, tmp_path):
+    name, text = RECORDS[have]
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    places = pd.DataFrame({"sensor": ["3_7", "3_8"], "x_m": 0.0, "y_m": 0.0, "z_m": 0.0})
+    found = measured.read(tmp_path / name, sensors=places, **written(have).measured.table()).table
+    assert found["time"].iloc[0] == HOUR
+    assert found["par_umol_m2_s"].iloc[0] == 500.0
+
+
+@pytest.mark.parametrize("have", IMAGES)
+def test_images_are_read_as_reflectance(have, tmp_path):
+    kind, most = IMAGES[have]
+    section = written(have).chlorophyll
+    bands = camera(section.camera_bands).bands
+    values = np.linspace(0.03, 0.45, len(bands))[:, None, None] * np.ones((1, 40, 40))
+    with rasterio.open(
+        tmp_path / "a.tif", "w", driver="GTiff", count=len(bands), height=40, width=40, dtype=kind,
+        crs="EPSG:25832", transform=from_origin(5e5, 5.3e6, 0.1, 0.1),
+    ) as file:  # fmt: skip
+        file.write((values * most).astype(kind))
+    found = user_rasters.read(tmp_path / "a.tif", bands, scale=section.user.scale)
+    assert len(CAMERAS[section.camera]) == len(bands)
+    assert np.nanmedian(found.raster.values, axis=(1, 2)) == pytest.approx(
+        values[:, 0, 0], abs=1e-3
+    )
