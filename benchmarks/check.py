@@ -44,7 +44,8 @@ def plot(n: int, rng: np.random.Generator) -> np.ndarray:
 def write(path: Path, n: int) -> None:
     rng = np.random.default_rng(1)
     attributes = {"Reflectance": rng.normal(-8, 3, n).astype(np.float32)}
-    clouds.write(path, Cloud(plot(n, rng), np.array([5e5, 5.3e6, 200.0]), attributes), scale_m=1e-3)
+    cloud = Cloud(plot(n, rng), np.array([5e5, 5.3e6, 200.0]), attributes)
+    clouds.write(path, cloud, scale_m=1e-3)
 
 
 def main() -> None:
