@@ -66,9 +66,8 @@ def main() -> None:
         wall, used = time.perf_counter() - wall, time.process_time() - used
     peak_gb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     stems = len(check["cloud"]["stems"])
-    print(
-        f"{n:,} points, {stems} stems: {used:.1f} s of processor time, {wall:.1f} s, {peak_gb:.2f} GB"
-    )
+    print(f"{n:,} points, {stems} stems")
+    print(f"{used:.1f} s of processor time, {wall:.1f} s, {peak_gb:.2f} GB")
 
 
 if __name__ == "__main__":
