@@ -16,7 +16,8 @@ HEAD = """\
 # What each refinement of the light changes and costs, one at a time on the pilot.
 # rmse_rel, bias_rel: against the finest, as shares of open-sky PAR; noise_rel: what random numbers
 # alone would make of it; effect_rel: rmse without noise; truth: against the true plant's light.
-# Costs are seconds of this very run with compiled kernels; run_cost_s is predicted for all sensors
+# work_s: counted rays, surfaces and products at fixed prices, by which the model is chosen; wall_s
+# and cpu_s: seconds of this very run with compiled kernels. run_cost_s is predicted for all sensors
 # and times.
 """
 

@@ -148,6 +148,17 @@ def test_under_a_leaf_scattering_and_the_edge_of_its_shade_count():
     )
     assert all(set(effect.parts) == set(costs.PARTS) for effect in effects)
     assert all(effect.cost.wall_s > 0 for effect in effects)
+    # counted work is the same in every run
+    again = refinements.model_effects(one, scene)[0]
+    assert [e.cost.work_s for e in again] == [e.cost.work_s for e in effects]
+    assert (
+        by_level["sun", "point"].parts["direct"].work_s
+        < by_level["sun", "disc"].parts["direct"].work_s
+    )
+    assert (
+        by_level["max_orders", 0].parts["paths"].work_s
+        < by_level["max_orders", 2].parts["paths"].work_s
+    )
     # shade that moves over the sensor is missed by long steps
     steps = refinements.step_effects(one, scene, one.sky, seed=1)
     assert steps[0].rmse_rel > steps[-2].rmse_rel > steps[-1].rmse_rel == 0
@@ -158,9 +169,9 @@ def test_under_a_leaf_scattering_and_the_edge_of_its_shade_count():
 
 def parts(direct, paths, products):
     return {
-        "direct": Cost(direct, direct),
-        "paths": Cost(paths, paths),
-        "products": Cost(products, products),
+        "direct": Cost(direct, direct, direct),
+        "paths": Cost(paths, paths, paths),
+        "products": Cost(products, products, products),
     }
 
 
@@ -176,9 +187,9 @@ EFFECTS = [
     Effect("max_orders", 1, 0.013, 0.0, 0.0, parts(10.0, 5.0, 1.0)),
     Effect("max_orders", 2, 0.003, 0.0, 0.0, parts(10.0, 10.0, 1.0)),
     Effect("max_orders", 12, 0.0, 0.0, 0.0, FULL),
-    Effect("step_min", 30, 0.2, 0.0, 0.0, {"direct": Cost(0.1, 0.1)}),
-    Effect("step_min", 10, 0.15, 0.0, 0.0, {"direct": Cost(0.3, 0.3)}),
-    Effect("step_min", 1, 0.0, 0.0, 0.0, {"direct": Cost(3.0, 3.0)}),
+    Effect("step_min", 30, 0.2, 0.0, 0.0, {"direct": Cost(0.1, 0.1, 0.1)}),
+    Effect("step_min", 10, 0.15, 0.0, 0.0, {"direct": Cost(0.3, 0.3, 0.3)}),
+    Effect("step_min", 1, 0.0, 0.0, 0.0, {"direct": Cost(3.0, 3.0, 3.0)}),
 ]
 SAME_SIZE = cheapest.Scale(1.0, 1.0, 1.0)
 
@@ -194,6 +205,24 @@ def test_the_cheapest_model_whose_effects_add_up_to_the_tolerance_is_chosen():
     # 13 and 4 thousandths are too much together; of equal cost, the finer model
     assert chosen(0.015).model == replace(FINEST, sky_patches=145, max_orders=2)
     assert chosen(0.001).model == FINEST
+
+
+def test_the_choice_does_not_depend_on_the_clock():
+    draw = np.random.default_rng(5)
+
+    def elsewhere(effect):
+        parts = {
+            name: replace(cost, wall_s=draw.uniform(0.1, 9), cpu_s=draw.uniform(0.1, 9))
+            for name, cost in effect.parts.items()
+        }
+        return replace(effect, parts=parts)
+
+    other = [elsewhere(effect) for effect in EFFECTS]
+    for tolerance in (0.001, 0.015, 0.02, 1.0):
+        found = cheapest.choose(
+            other, FINEST, tolerance=tolerance, scale=SAME_SIZE, measure=lambda model: 0.0
+        )
+        assert found.model == chosen(tolerance).model
 
 
 def test_what_saves_nothing_is_never_left_out_whatever_the_clock_says():

@@ -81,7 +81,8 @@ def advise(
         "left_out_rel": found.effects_rel,
         "measured_rel": found.measured_rel,
         "run_cost_s": {
-            name: {"wall_s": cost.wall_s, "cpu_s": cost.cpu_s} for name, cost in costs.items()
+            name: {"work_s": cost.work_s, "wall_s": cost.wall_s, "cpu_s": cost.cpu_s}
+            for name, cost in costs.items()
         },
         "refinements": refinements.rows(effects),
     }

@@ -19,7 +19,7 @@ SAVES = {
 }
 """Which parts a refinement can make cheaper; what saves nothing (sky, ground) is never left out."""
 LEAST_SAVING = 0.1
-"""Savings of less than this share are within the clock's scatter and not worth an error."""
+"""Savings of less than this share are not worth an error."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +59,7 @@ class Scale:
 def predicted(effects: list[Effect], finest: Model, model: Model, scale: Scale) -> Cost:
     """What the whole run costs with a model, from the costs of its levels one at a time.
 
-    Each level makes a part cheaper by the factor by which it did so on the pilot, in processor
-    time: others may be at work on the machine.
+    Each level makes a part cheaper by the factor by which it did so on the pilot, in counted work.
     """
     total = Cost()
     base = next(e for e in effects if e.refinement == "sun" and e.level == finest.sun)
@@ -73,7 +72,7 @@ def predicted(effects: list[Effect], finest: Model, model: Model, scale: Scale) 
             if level != best:
                 # The run's own time step need not be one of those that were measured.
                 nearest = best if best in own else min(own, key=lambda x: abs(x - best))
-                ratio = own[level].parts[part].cpu_s / own[nearest].parts[part].cpu_s
+                ratio = own[level].parts[part].work_s / own[nearest].parts[part].work_s
                 factor *= min(ratio, 1.0)
         total += base.parts[part] * factor
     return total
@@ -132,7 +131,7 @@ def choose(
         left_out = sum(options[name][level] for name, level in zip(options, levels, strict=True))
         if left_out <= tolerance:
             model = replace(finest, **dict(zip(options, levels, strict=True)))
-            cost = predicted(effects, finest, model, scale).cpu_s
+            cost = predicted(effects, finest, model, scale).work_s
             allowed.append((cost, left_out, model))
     while allowed:
         dearest = min(cost for cost, _, _ in allowed) / (1 - LEAST_SAVING)

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from dapple import steps
+from dapple.advice import costs
 from dapple.advice.costs import PARTS, Cost, least, timed
 from dapple.light.light_model import Model, Tracing
 from dapple.light.series import Light
@@ -30,7 +31,7 @@ class Effect:
     parts : dict of str to Cost
         What each of `PARTS` cost in this very run.
     rmse_truth_rel, bias_truth_rel : float or None
-        Against the light of the truth, where there is pilot.
+        Against the light of the truth, where it is known.
     """
 
     refinement: str
@@ -89,7 +90,13 @@ def light_and_costs(
         lambda: steps.paths(scene, sensors_m, model, tracing, seed=stream_seed(seed, "paths"))
     )
     light, products = timed(lambda: steps.products(sunlit, counted, sky, optics, model, tracing))
-    return light, dict(zip(PARTS, (direct, paths, products), strict=True))
+    sizes = {"n_times": sky.sizes["time"], "n_bands": model.bands}
+    counted_work = (
+        direct.of(costs.work_of_sun(sunlit)),
+        paths.of(costs.work_of_paths(counted)),
+        products.of(costs.work_of_products(counted, **sizes)),
+    )
+    return light, dict(zip(PARTS, counted_work, strict=True))
 
 
 class Pilot:
@@ -135,7 +142,7 @@ class Pilot:
             # One more than asked for: the first may compile kernels.
             for _ in range(self.repeats + 1)
         ][1:]
-        best = {part: least(costs[part] for _, costs in runs) for part in PARTS}
+        best = {part: least(parts[part] for _, parts in runs) for part in PARTS}
         return runs[-1][0], best
 
     def difference(self, one: Light, other: Light) -> tuple[float, float]:

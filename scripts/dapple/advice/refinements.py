@@ -10,7 +10,7 @@ import pandas as pd
 import xarray as xr
 
 from dapple import steps
-from dapple.advice.costs import repeated
+from dapple.advice.costs import repeated, work_of_sun
 from dapple.advice.pilot import Effect, Pilot
 from dapple.formats.netcdf import time_coordinate, times
 from dapple.light.series import Light
@@ -44,6 +44,7 @@ def rows(effects: list[Effect]) -> dict[str, list[dict]]:
             "rmse_rel": effect.rmse_rel,
             "bias_rel": effect.bias_rel,
             "noise_rel": effect.noise_rel,
+            "work_s": effect.cost.work_s,
             "wall_s": effect.cost.wall_s,
             "cpu_s": effect.cost.cpu_s,
             "wall_s_of": {part: cost.wall_s for part, cost in effect.parts.items()},
@@ -123,7 +124,7 @@ def step_effects(
     -------
     list of Effect
         From the longest step to one minute; none for a series shorter than the longest step. The
-        cost is that of the direct beam alpilot.
+        cost is that of the direct beam alone.
     """
     stamps = times(series_sky)
     length = (stamps[-1] - stamps[0]).total_seconds() / 60
@@ -151,11 +152,13 @@ def step_effects(
     effects = []
     for step in sorted(STEPS_MIN, reverse=True):
         known = minutes[::step]
-        cost = repeated(partial(visible, known), pilot.repeats)[1]
+        found, cost = repeated(partial(visible, known), pilot.repeats)
         between = np.array([np.interp(minutes, known, row[known]) for row in seen])
         error = (between - seen) * share_of_beam
         rmse, bias = float(np.sqrt((error**2).mean())), float(error.mean())
-        effects.append(Effect("step_min", step, rmse, bias, 0.0, {"direct": cost}))
+        effects.append(
+            Effect("step_min", step, rmse, bias, 0.0, {"direct": cost.of(work_of_sun(found))})
+        )
     return effects
 
 
