@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pandas as pd
 import stability_tables
+import yaml
 
 DATA = Path(__file__).parents[1] / "docs" / "data"
 
@@ -35,9 +36,29 @@ def agreement_with_truth(folder: Path) -> pd.DataFrame:
 
 
 def virtual_apple(folder: Path) -> dict[str, pd.DataFrame]:
-    """The default run: light against the truth's, and both engines against each other."""
+    """The default run and its advice: light against the truth's, engines against each other."""
     engines = pd.read_csv(folder / "statistics" / "agreement.csv")
-    return {"default_run": agreement_with_truth(folder), "engines": engines}
+    return {"default_run": agreement_with_truth(folder), "engines": engines, **advice(folder)}
+
+
+def advice(folder: Path) -> dict[str, pd.DataFrame]:
+    """Effects and work of every refinement, and the model that is chosen."""
+    facts = yaml.safe_load((folder / "advice.yaml").read_text())
+    columns = ["refinement", "level", "effect_rel", "rmse_truth_rel", "work_s", "cpu_s"]
+    rows = [
+        {"refinement": name, **row}
+        for effects in (facts["refinements"], facts["geometry"])
+        for name, rows in effects.items()
+        for row in rows
+    ]
+    cost = facts["run_cost_s"]
+    chosen = facts["chosen"] | {key: facts[key] for key in ("tolerance", "measured_rel")}
+    chosen |= {
+        f"share_of_{kind}": cost["chosen"][kind] / cost["finest"][kind]
+        for kind in ("work_s", "cpu_s")
+    }
+    model = pd.DataFrame([{"model": "chosen", **chosen}])
+    return {"advice": pd.DataFrame(rows)[columns], "advice_model": model}
 
 
 def apple(folder: Path) -> dict[str, pd.DataFrame]:
