@@ -244,7 +244,7 @@ def trees(facts: CloudFacts, settings: dict, path: str | Path) -> Iterator[Findi
         return
     yield findings.warning(
         path,
-        f"{len(facts.stems)} stems",
+        f"{len(facts.stems)} {facts.numbers['trees_found_by']}",
         "one tree, or the choice of one",
         "All are taken for one plant. Choose one by its number or a place near its stem; its "
         "neighbours then stay as shade.",

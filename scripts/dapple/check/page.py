@@ -141,13 +141,16 @@ def _cloud_rows(cloud: dict[str, Any]) -> Iterable[tuple[str, str]]:
         f"{ground['z_m']:.2f} m ({ground['found_by']}), slope {100 * ground['slope']:.0f} %",
     )
     yield "height", f"{cloud['height_m']:.1f} m above the ground"
-    yield "stems", str(len(cloud["stems"]))
+    what = cloud["trees_found_by"]
+    yield what, str(len(cloud["stems"]))
     for stem in cloud["stems"][:SHOWN]:
         yield (
-            f"stem {stem['id']}",
+            f"{what.removesuffix('s')} {stem['id']}",
             f"at [{stem['east_m']:.2f}, {stem['north_m']:.2f}], {stem['height_m']:.1f} m high, "
             f"{100 * stem['width_m']:.0f} cm wide",
         )
+    if len(cloud["stems"]) > SHOWN:
+        yield "…", f"{len(cloud['stems']) - SHOWN} more in check.html"
 
 
 def _crs(crs: str) -> str:
