@@ -1,5 +1,8 @@
 """LESS 3 on dapple's files against closed forms and against dapple's own engines."""
 
+import os
+import subprocess
+import sys
 from importlib.util import find_spec
 
 import numpy as np
@@ -153,6 +156,25 @@ def test_less_and_mitsuba_see_the_same_light_under_a_small_crown():
         for part in ("sky", "scattered"):
             two = (float(x[f"par_{part}_umol_m2_s"].sum()) for x in (one, other))
             assert next(two) == pytest.approx(next(two), rel=0.05)
+
+
+@WITH_LESS
+def test_an_exported_scene_run_without_dapple_gives_the_light_of_the_engine(tmp_path):
+    crown = leaves(50, 0.2, (-0.8, -0.8, 0.8), (0.8, 0.8, 2.0), seed=3)
+    scene = Scene(of_kinds(leaf=crown, wood=level((-0.1, 0.1), (-0.1, 0.1), 0.7)))
+    table, spectra = sensors((0.3, 0.0, 0.2), (-0.4, 0.5, 0.0)), optics(0.3, 0.2, 0.4, 0.3)
+    above = sky((35.0, 140.0), coefficients=PEREZ)
+    numbers = LessRays(640, 2, max_orders=12, sun_diameter_deg=0.0, seed=1)
+    less_files.write(tmp_path, scene, spectra, above, table, numbers)
+    command = [sys.executable, "less_run.py", "."]
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    subprocess.run(command, cwd=tmp_path, env=environment, check=True, capture_output=True)
+    written = pd.read_csv(tmp_path / "light.csv")
+    found = run(scene, above, table, spectra, n_rays=640, diameter=0.0)
+    assert written["sensor"].tolist() == ["1_0", "1_1"]
+    for name in ("par", "par_direct", "par_sky", "par_scattered", "standard_error"):
+        engine = found[f"{name}_umol_m2_s"].to_numpy()[:, 0]
+        assert written[name.removeprefix("par_")].to_numpy() == pytest.approx(engine, rel=1e-12)
 
 
 def test_the_sky_on_the_grid_of_less_has_a_horizontal_irradiance_of_one():

@@ -60,6 +60,8 @@ KEYS = {
     "light={transport: {max_shadow_rays: 99}}": f"light*5 agreement {COMPARED}",
     "light={timestep: {replicates: 5}}": OWN_CHECK,
     "light={timestep: {step_min: 120}}": "timesteps*5 reference*5 agreement",
+    # LESS 3: meshes in two batches, voxels at a few times in one
+    "light={check_with: [timestep, less]}": "less_timesteps*8 less*5 agreement",
     "light={sun_diameter_deg: 0.5}": SKY,
     "ground_z_m=-0.1": f"scan clean {CLASSES} sensors".replace(traced(4), traced(5)),
     "statistics={confidence: 0.9}": f"record_statistics {FIGURES}",

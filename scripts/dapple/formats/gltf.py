@@ -43,9 +43,11 @@ def write(
         for number, place in enumerate(_turned(places)):
             move = np.eye(4)
             move[:3, 3] = place
-            scene.add_geometry(
-                geometry, node_name=f"{name}_{number}", geom_name=name, transform=move
-            )
+            node = f"{name}_{number}"
+            if number == 0:
+                scene.add_geometry(geometry, node_name=node, geom_name=name, transform=move)
+            else:
+                scene.graph.update(node, geometry=name, matrix=move)
     with atomic(path) as partial:
         partial.write_bytes(scene.export(file_type="glb"))
 

@@ -113,10 +113,10 @@ def in_disc(n_fine: int = 50) -> np.ndarray:
     return weight / weight.sum()
 
 
-def mean_and_variance(pixels: np.ndarray) -> tuple[float, float]:
-    """Mean over a sensor's disc of what pixels (p,) see, and its variance."""
+def mean_and_variance(pixels: np.ndarray, error: np.ndarray) -> tuple[float, float]:
+    """Mean over a sensor's disc of what pixels (p,) see with standard errors, and its variance."""
     weight = in_disc()
-    return float(weight @ pixels), float(pixels.var(ddof=1) * (weight**2).sum())
+    return float(weight @ pixels), float(weight**2 @ error**2)
 
 
 def seen(
@@ -126,9 +126,10 @@ def seen(
     bands: list[float],
     quality: int,
     orders: int,
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Irradiance of a plate as its pixels see it, (p,) over all bands: straight, and scattered.
 
+    The third is the standard error of their sum; bands share their paths, so their errors add up.
     Each pixel takes `quality` rays; light meets at most so many surfaces (`orders`) on its way.
     """
     x, y, z = (float(value) for value in place)
@@ -144,13 +145,14 @@ def seen(
         camera,
         bands=bands,
         quality=max(1, quality),
-        outputs=("radiance", "scattering_order"),
+        outputs=("radiance", "standard_error", "scattering_order"),
         max_output_order=ORDERS,
     )
     image = scene.simulate(sensor, scattering_order=orders + 1)
     by_order = np.asarray(image.scattering_orders, dtype=np.float64)
     par = np.pi * by_order.sum(axis=-1).reshape(len(by_order), -1)
-    return par[:2].sum(axis=0), par[2:].sum(axis=0)
+    error = np.pi * np.asarray(image.standard_error, dtype=np.float64).sum(axis=-1).ravel()
+    return par[:2].sum(axis=0), par[2:].sum(axis=0), error
 
 
 def suns(
@@ -190,26 +192,27 @@ def under_the_sun(
     rays = facts["rays"]
     sky = Sky(bands, beam, np.zeros(len(bands)), np.zeros(SKY_GRID))
 
-    def lit(way: tuple[float, float], quality: int, orders: int) -> tuple[np.ndarray, np.ndarray]:
+    def lit(way: tuple[float, float], quality: int, orders: int) -> tuple[np.ndarray, ...]:
         source = less.Sun(zenith=way[0], azimuth=way[1], irradiance=1.0)
         scene.illumination = less.Illumination(source=source, atmosphere=sky)
         return seen(scene, place, facts, bands, quality, orders)
 
     quality = round(rays["rays"] / PIXELS**2)
-    straight, scattered = lit(angles, quality, rays["max_orders"])
+    straight, scattered, error = lit(angles, quality, rays["max_orders"])
+    more, variance = mean_and_variance(scattered, error)
     points = suns(*angles, rays["sun_diameter_deg"], rays["suns"], seed)
     if len(points) == 1:
-        variance = mean_and_variance(straight + scattered)[1]
-        return mean_and_variance(straight)[0], mean_and_variance(scattered)[0], variance
+        return mean_and_variance(straight, error)[0], more, variance
     few = 1 if facts["voxels"] is None else quality // len(points)
     parts = np.zeros((len(points), PIXELS**2))
     for number, way in enumerate(points):
         if way[0] < 90.0:
             parts[number] = lit(way, few, 0)[0]
-    of_sun = np.array([mean_and_variance(pixels)[0] for pixels in parts])
-    direct, spread = mean_and_variance(parts.mean(axis=0))
-    more, variance = mean_and_variance(scattered)
-    return direct, more, variance + spread + of_sun.var(ddof=1) / len(points)
+    # between suns, and between places on the disc, which all suns see alike
+    spread = np.full(PIXELS**2, parts.mean(axis=0).std(ddof=1))
+    direct, between_places = mean_and_variance(parts.mean(axis=0), spread)
+    between_suns = (parts @ in_disc()).var(ddof=1) / len(points)
+    return direct, more, variance + between_places + between_suns
 
 
 def main(folder: Path) -> None:
@@ -237,12 +240,12 @@ def main(folder: Path) -> None:
                     atmosphere=Sky(bands, np.zeros(len(bands)), diffuse[step], sky[step]),
                 )
                 quality = round(rays["rays"] / PIXELS**2)
-                straight, more = seen(
+                straight, more, error = seen(
                     scene, places[number], facts, bands, quality, rays["max_orders"]
                 )
-                from_sky = mean_and_variance(straight)[0]
-                scattered += mean_and_variance(more)[0]
-                variance += mean_and_variance(straight + more)[1]
+                from_sky, of_sky = mean_and_variance(straight, error)
+                scattered += mean_and_variance(more, error)[0]
+                variance += of_sky
             parts = (direct, from_sky, scattered)
             rows.append((time, label, sum(parts), *parts, float(np.sqrt(variance))))
     with (folder / "light.csv").open("w", newline="") as file:
