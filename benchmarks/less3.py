@@ -7,9 +7,10 @@ all sensors, LESS a sample of sensors and times, evenly chosen, as Frey et al. (
 of a white plate of 3 cm for every sensor and time, 12,800 rays, all bands, a parallel sun; so
 dapple's sun is a point here too. Both are run in turns, `REPEATS` times; times are the least.
 
-Rows of RUN in the output are replaced, others stay. `ratio` is the processor time of LESS for the
-whole day (its time to build the scene, and that of the sample times the share of the sample) at
-dapple's standard error, over dapple's: errors fall with the root of the number of rays.
+Rows that are measured again are replaced in the output, others stay. `ratio` is the processor time
+of LESS for the whole day (its time to build the scene, and that of the sample times the share of
+the sample) at dapple's standard error, over dapple's: errors fall with the root of the number of
+rays.
 """
 
 import argparse
@@ -184,6 +185,7 @@ def main() -> None:
     parser.add_argument("run")
     parser.add_argument("--results", type=Path, default=ROOT / "results")
     parser.add_argument("--reconstructions", nargs="+", default=["polygons", "truth"])
+    parser.add_argument("--skies", nargs="+", default=["as given", "isotropic", "no sun"])
     parser.add_argument("--sensors", type=int, default=9)
     parser.add_argument("--times", type=int, default=12)
     parser.add_argument("--output", type=Path, default=ROOT / "docs/data/less.csv")
@@ -198,14 +200,19 @@ def main() -> None:
         wood = folder / f"structure/{'truth' if name == 'truth' else 'polygons'}/wood.ply"
         scene = scene_files.read([str(leaves)], str(wood))[0]
         n = (4, 2) if turbid else (options.sensors, options.times)
-        for kind, above in (("as given", sky), ("isotropic", isotropic(sky))):
+        even = isotropic(sky)
+        dark = even.assign(beam_normal_umol_m2_s=0.0 * even["beam_normal_umol_m2_s"])
+        for kind, above in {"as given": sky, "isotropic": even, "no sun": dark}.items():
+            if kind not in options.skies:
+                continue
             row = compare(scene, above, optics, table, n)
             found.append({"run": options.run, "reconstruction": name, "sky": kind} | row)
             print(pd.Series(found[-1]).to_string(), flush=True)
     new = pd.DataFrame(found)
     if options.output.is_file():
         old = tables.read(options.output)
-        old = old[(old["run"] != options.run) | ~old["reconstruction"].isin(new["reconstruction"])]
+        keys = ["run", "reconstruction", "sky"]
+        old = old[~old.set_index(keys).index.isin(new.set_index(keys).index)]
         new = pd.concat([old, new], ignore_index=True)
     tables.write(options.output, new)
 
