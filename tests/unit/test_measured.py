@@ -105,6 +105,13 @@ def test_a_wide_table_has_a_column_for_each_sensor(tmp_path):
     assert read["time"].iloc[0] == pd.Timestamp("2023-08-10 09:10", tz="UTC")
 
 
+def test_the_temperature_of_a_sensor_is_not_its_light(tmp_path):
+    path = tmp_path / "wide.csv"
+    path.write_text("time_utc,PAR_a_Avg,T_a_Avg\n2023-08-10 10:00,300,21\n")
+    read = measured.read(path, sensors=places("a")).table
+    assert read["par_umol_m2_s"].tolist() == [300]
+
+
 def test_two_columns_for_one_sensor_need_a_pattern(tmp_path):
     path = tmp_path / "wide.csv"
     path.write_text("time_utc,PAR_a_Avg,PAR_a_Max\n2023-08-10 10:00,300,400\n")

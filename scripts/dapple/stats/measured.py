@@ -196,7 +196,7 @@ def _columns_of_sensors(
     else:
         columns = [source.require([pattern], "measured.par_column")] if pattern else columns
         found = {label: [name for name in columns if _is_of(name, label)] for label in labels}
-    found = {label: names for label, names in found.items() if names}
+    found = {label: _of_light(source, names) for label, names in found.items() if names}
     for label, names in found.items():
         if len(names) > 1:
             raise InputError(
@@ -219,6 +219,18 @@ def _columns_of_sensors(
         "Name the columns in `measured.sensor_column` and `measured.par_column`; the latter may be "
         "a pattern such as 'PAR_{sensor}_Avg'.",
     )
+
+
+def _of_light(source: Table, columns: list[str]) -> list[str]:
+    """Of several columns of one sensor those of light: its temperature may stand beside them."""
+    if len(columns) == 1:
+        return columns
+    named = [
+        name
+        for name in columns
+        if _is_par(source, name) or {"par", "ppfd"} & set(re.findall(r"[^\W_]+", name.lower()))
+    ]
+    return named or columns
 
 
 def _is_par(source: Table, column: str) -> bool:
