@@ -14,6 +14,10 @@ from dapple.formats import cloud_las_header
 from dapple.formats.cloud_las_header import LASZIP, Header
 from dapple.programs import silenced
 
+LAYERED = 3
+"""Compressor of point formats 6 to 10, which keeps the parts of a point in layers."""
+LAYERS, EXTRA_BYTES = {10: 9, 11: 1, 12: 2, 13: 1}, 14
+"""Layers of an item by its kind; extra bytes have one each."""
 POINTWISE = 1
 """Compressor of LASzip 1 and 2 that keeps one chunk and no table of chunks."""
 
@@ -40,6 +44,7 @@ def blocks(path: Path, header: Header, chunk: int) -> Iterator[bytes | bytearray
         return
     _check_items(path, header, record)
     _check_chunks(path, header)
+    _check_layers(path, header, record)
     with path.open("rb") as handle:
         handle.seek(header.data_at)
         decompressor = None
@@ -83,6 +88,24 @@ def _check_items(path: Path, header: Header, record: bytes) -> None:
             f"compressed items of {sizes} bytes and points of {header.record_bytes}",
             "as many of one as of the other",
             "Export the file again.",
+        )
+
+
+def _check_layers(path: Path, header: Header, record: bytes) -> None:
+    """The layers of the first chunk fit into the file: lazrs takes memory for them as announced."""
+    n_items = struct.unpack_from("<H", record, 32)[0]
+    items = [struct.unpack_from("<HH", record, 34 + 6 * k) for k in range(n_items)]
+    n_layers = sum(LAYERS.get(kind, size if kind == EXTRA_BYTES else 0) for kind, size in items)
+    if struct.unpack_from("<H", record)[0] != LAYERED or not header.count:
+        return
+    with path.open("rb") as handle:
+        handle.seek(header.data_at + 8 + header.record_bytes + 4)
+        head = handle.read(4 * n_layers)
+    lengths = struct.unpack(f"<{len(head) // 4}I", head[: len(head) // 4 * 4])
+    size = path.stat().st_size
+    if len(lengths) < n_layers or sum(lengths) > size:
+        raise cloud_las_header.incomplete(
+            path, f"{sum(lengths):,} bytes announced for the first points, in {size:,} bytes"
         )
 
 

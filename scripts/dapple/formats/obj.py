@@ -70,15 +70,17 @@ def _checked(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Drop repeated closing corners and unused vertices; refuse faces that are no polygon."""
     count = np.array([len(face) for face in faces])
-    corners = np.concatenate([np.asarray(face, np.int64) for face in faces])
-    if corners.min() < 0 or corners.max() >= len(vertices):
-        worst = corners.max() if corners.max() >= len(vertices) else corners.min()
+    numbers = [corner for face in faces for corner in face]
+    low, high = min(numbers, default=0), max(numbers, default=0)  # may be too long for an int64
+    if low < 0 or high >= len(vertices):
+        worst = high if high >= len(vertices) else low
         raise InputError(
             path,
             f"a face with vertex {worst + 1}",
             f"vertices 1 to {len(vertices)}",
             "The file is damaged or truncated: copy or export it again.",
         )
+    corners = np.array(numbers, np.int64)
     last = np.cumsum(count) - 1
     first = last - count + 1
     closed = (count > 1) & (vertices[corners[first]] == vertices[corners[last]]).all(axis=1)

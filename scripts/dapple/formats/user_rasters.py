@@ -227,6 +227,9 @@ def _read(
         }
         with WarpedVRT(file, **options) as plain:
             square = _square(plain)
+        size = Window(0, 0, square["width"], square["height"])
+        if max(square["width"], square["height"]) > MOST_VALUES:
+            _bound(path, size, len(chosen))
         with WarpedVRT(file, **options, **square) as source:
             transform, shape = source.transform, (source.height, source.width)
             window = _window(path, transform, shape, bounds_m)
