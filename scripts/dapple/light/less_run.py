@@ -229,7 +229,7 @@ def main(folder: Path) -> None:
     for step, time in enumerate(times):
         for number, label in enumerate(labels):
             direct = from_sky = scattered = variance = 0.0
-            if beam[step].any():
+            if beam[step].any() and angles[step][0] < 90.0:
                 seed = [rays["seed"], step, number]
                 direct, scattered, variance = under_the_sun(
                     scene, places[number], facts, bands, beam[step], angles[step], seed
