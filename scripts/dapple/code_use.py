@@ -175,7 +175,6 @@ def _imported(node: ast.Import | ast.ImportFrom) -> dict[str, tuple[Path, str | 
     return found
 
 
-@cache
 def _file(module: str) -> Path | None:
     if module.split(".")[0] != "dapple":
         return None
