@@ -60,8 +60,9 @@ def of_run(inputs: Mapping[str, Any], options: Mapping[str, Any]) -> Figure:
         light = zip(names, inputs["light"], strict=True)
         parts = [simulated(netcdf.read(path), name) for name, path in light]
         records, r = pd.concat(parts, ignore_index=True), None
-        labels = records["sensor"].unique()
-        chosen = chosen or list(labels[:: max(1, len(labels) // 6)][:6])
+    # Without records, or without light to compare them by, sensors are spread over the plan.
+    labels = records["sensor"].unique()
+    chosen = chosen or list(labels[:: max(1, len(labels) // 6)][:6])
     return draw(records, chosen, timezone=options["timezone"], per_sensor=r)
 
 
