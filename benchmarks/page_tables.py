@@ -38,7 +38,8 @@ def agreement_with_truth(folder: Path) -> pd.DataFrame:
 def virtual_apple(folder: Path) -> dict[str, pd.DataFrame]:
     """The default run and its advice: light against the truth's, engines against each other."""
     engines = pd.read_csv(folder / "statistics" / "agreement.csv")
-    return {"default_run": agreement_with_truth(folder), "engines": engines, **advice(folder)}
+    found = {"default_run": agreement_with_truth(folder), "engines": engines}
+    return found | (advice(folder) if (folder / "advice.yaml").is_file() else {})
 
 
 def advice(folder: Path) -> dict[str, pd.DataFrame]:
