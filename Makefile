@@ -2,7 +2,7 @@
 CORES ?= 2
 BIN := .venv/bin
 
-.PHONY: run test setup lint format docs lock coverage hooks
+.PHONY: run test setup lint format docs site lock coverage hooks
 
 run: setup
 	$(BIN)/snakemake --cores $(CORES)
@@ -38,6 +38,10 @@ docs: setup
 	PYTHONPATH=scripts $(BIN)/python -m dapple.config.docs
 	$(BIN)/python tools/pages.py
 	$(BIN)/python tools/rule_graph.py
+
+# The pages as a website, without the network; a warning is an error.
+site: setup
+	$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
 
 lock: setup
 	$(BIN)/uv pip compile pyproject.toml --group dev --generate-hashes --universal --no-header --quiet -o requirements.lock

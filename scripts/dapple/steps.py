@@ -3,12 +3,12 @@
 Rules run one stage a script, from file to file; stability map, advice, trade-off and benchmarks run
 the same functions one after the other. From points to light:
 
-    cloud.clean.clean         points without noise, one a voxel
-    cloud.classify.classify   leaf or wood
-    polygons, surfels, voxels what a scan is rebuilt as
-    scene                     what light meets
-    sun, paths, products      shadow rays to the sun's disc; paths back from the sensors, once for
-                              any sky and spectrum; both put together under a sky
+- `cloud.clean.clean`: points without noise, one a voxel
+- `cloud.classify.classify`: leaf or wood
+- `polygons`, `surfels`, `voxels`: what a scan is rebuilt as
+- `scene`: what light meets
+- `sun`, `paths`, `products`: shadow rays to the sun's disc; paths back from the sensors, once for
+  any sky and spectrum; both put together under a sky
 """
 
 from collections.abc import Iterable

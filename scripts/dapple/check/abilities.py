@@ -29,6 +29,13 @@ def of(facts: CloudFacts, settings: dict[str, Any]) -> list[dict[str, Any]]:
             dense,
             f"points {100 * spacing:.1f} cm apart" if dense else f"{points} points: too few",
         ),
+        (
+            "surfels",
+            dense,
+            f"{shots}, and settle how open leaves are"
+            if has_shots
+            else "by the distance of points alone: shots that met nothing are not known",
+        ),
         ("voxels", has_shots, shots),
         (
             "leaf and wood by reflectance",

@@ -82,9 +82,9 @@ def projection(distribution: str, zenith_rad: np.ndarray) -> np.ndarray:
 
     Notes
     -----
-    Ross (1981): the integral over leaf angles of the density times the mean of |cos| of the angle
-    between beam and normal over azimuth. Between tabulated angles 0.1° apart G is interpolated
-    (error below 2e-6).
+    Ross (1981): the integral over leaf angles of the density times the mean absolute cosine of the
+    angle between beam and normal over azimuth. Between tabulated angles 0.1° apart G is
+    interpolated (error below 2e-6).
     """
     zenith = np.asarray(zenith_rad, np.float64)
     if distribution == "spherical":
