@@ -9,8 +9,11 @@ from dapple.scene.traced import TracedScene
 
 FIRST_RAYS = 32
 """Rays of each replicate in the first round; each further round doubles what was traced."""
-PRIOR_WEIGHT = 8.0
+PRIOR_WEIGHT = 4.0
 """Degrees of freedom that the pooled variance stands for when a pair's own variance is judged."""
+AGREEING = 0.25
+"""Share of the tolerance that is left to pairs whose rays all agree. Such rays are cheap, and most
+pairs are of this kind: what they may have missed is not to add to the error of the light."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +58,8 @@ def sunlit(
     sun_directions : (t, 3) float64
         Unit vectors towards the middle of the sun; below the horizon nothing is seen.
     tolerance : float
-        Rays are added until the standard error is smaller, as a share of the disc.
+        Rays are added until the standard error is smaller, as a share of the disc; where all rays
+        agree, until it is smaller than a quarter of it (`AGREEING`).
     max_rays : int
         Most rays of a sensor at a time, of all replicates.
     seed : int
@@ -97,7 +101,8 @@ def sunlit(
         done[pairs] = rays
         share, every = total[pairs] / rays, rays * n_replicates
         error[pairs] = _standard_error(share, square[pairs], every)
-        pairs = pairs[error[pairs] > tolerance]
+        agree = share.mean(axis=1) % 1 == 0
+        pairs = pairs[error[pairs] > np.where(agree, AGREEING * tolerance, tolerance)]
         before, rays = rays, min(2 * rays, most)
     share = total / np.maximum(done, 1)[:, None]
     return Sunlit(
@@ -127,27 +132,26 @@ def _standard_error(share: np.ndarray, square: np.ndarray, n_rays: int) -> np.nd
     -----
     Replicates are independent: their variance is right on the mean of many pairs, but a rough guess
     for one. It is averaged by degrees of freedom with that of single rays, times a factor by which
-    the pattern is better than chance, which all pairs share.
+    the pattern is better than chance, which all pairs share. What remains of doubt widens the error
+    as in Student's distribution, by ν / (ν - 2) in its square.
 
     Where rays hit or miss and c of n differ from the rest, c at most as many as there are
-    replicates, that says little: the pair may be lit a bit more or a bit less. Its mean square
-    error is that of an even prior, (c + 2) / n². Where none differs it is smaller, since most
-    such pairs are lit or shaded throughout: 2 N₂ / (N₀ n²), with N_c pairs in which c rays differ
-    (Good 1953, Biometrika 40, 237-264; N₂ is taken as the mean of N₁ and N₂, one is added).
+    replicates, that says little: the pair may be lit a bit more or a bit less. Its error is that of
+    what c / n misses of the share under Jeffreys' prior, whose mean square is (c + 3/4) / n² for few
+    of many rays (Brown, Cai and DasGupta 2001, Statistical Science 16, 101-133, on that prior). So
+    it is where none differs: a fleck between the rays leaves no trace in them.
     """
     n_replicates = share.shape[1]
     mean = share.mean(axis=1)
     spread = np.maximum(square / n_rays - mean**2, 0)
     chance = spread / n_rays
     own = share.var(axis=1, ddof=1) / n_replicates
-    hits = np.minimum(mean, 1 - mean) * n_rays
+    differ = np.minimum(mean, 1 - mean) * n_rays
     whole = np.abs(square - mean * n_rays) < 1e-4 * n_rays  # each ray sees all or nothing
-    few = whole & (hits < n_replicates + 0.5)
+    few = whole & (differ < n_replicates + 0.5)
     if own[~few].any():
         chance[~few] *= min(own[~few].sum() / chance[~few].sum(), 1.0)
-    freedom = n_replicates - 1
-    steadied = (PRIOR_WEIGHT * chance + freedom * own) / (PRIOR_WEIGHT + freedom)
-    none, some = few & (hits < 0.5), few & (hits > 0.5) & (hits < 2.5)
-    of_none = min((some.sum() + 2) / (none.sum() + 1), 2.0)
-    of_few = np.where(none, of_none, hits + 2) / n_rays**2
-    return np.sqrt(np.where(few, of_few, steadied))
+    own_freedom = n_replicates - 1
+    freedom = PRIOR_WEIGHT + own_freedom
+    steadied = (PRIOR_WEIGHT * chance + own_freedom * own) / (freedom - 2)
+    return np.sqrt(np.where(few, (differ + 0.75) / n_rays**2, steadied))
