@@ -84,11 +84,16 @@ def test_in_the_penumbra_of_an_edge_errors_are_what_they_are_said_to_be():
     assert np.abs(z).max() < 4
 
 
-def test_rays_go_where_the_sun_is_partly_hidden():
+def test_rays_are_added_until_errors_are_small_and_smaller_where_all_rays_agree():
     sensors_m = np.array([[-2.0, 0.0, 0.0], [0.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
-    full, half, none = see(Scene(of_kinds(wood=half_plane(4.0))), sensors_m, UP).n_rays[:, 0]
-    assert full == none
-    assert half >= 2 * full
+    scene = Scene(of_kinds(wood=half_plane(4.0)))
+    for tolerance in (4e-3, 1e-3, 2.5e-4):
+        found = see(scene, sensors_m, UP, tolerance=tolerance)
+        full, half, none = found.standard_error[:, 0]
+        assert 0 < half <= tolerance
+        assert 0 < full == none <= tolerance / 8
+    finer = see(scene, sensors_m, UP, tolerance=1e-4).n_rays
+    assert (finer > found.n_rays)[1].all()
 
 
 def test_no_more_rays_than_allowed_are_traced():

@@ -11,7 +11,7 @@ FIRST_RAYS = 32
 """Rays of each replicate in the first round; each further round doubles what was traced."""
 PRIOR_WEIGHT = 4.0
 """Degrees of freedom that the pooled variance stands for when a pair's own variance is judged."""
-AGREEING = 0.25
+AGREEING = 0.125
 """Share of the tolerance that is left to pairs whose rays all agree. Such rays are cheap, and most
 pairs are of this kind: what they may have missed is not to add to the error of the light."""
 
@@ -59,7 +59,7 @@ def sunlit(
         Unit vectors towards the middle of the sun; below the horizon nothing is seen.
     tolerance : float
         Rays are added until the standard error is smaller, as a share of the disc; where all rays
-        agree, until it is smaller than a quarter of it (`AGREEING`).
+        agree, until it is smaller than an eighth of it (`AGREEING`).
     max_rays : int
         Most rays of a sensor at a time, of all replicates.
     seed : int
@@ -136,10 +136,10 @@ def _standard_error(share: np.ndarray, square: np.ndarray, n_rays: int) -> np.nd
     as in Student's distribution, by ν / (ν - 2) in its square.
 
     Where rays hit or miss and c of n differ from the rest, c at most as many as there are
-    replicates, that says little: the pair may be lit a bit more or a bit less. Its error is that of
-    what c / n misses of the share under Jeffreys' prior, whose mean square is (c + 3/4) / n² for few
-    of many rays (Brown, Cai and DasGupta 2001, Statistical Science 16, 101-133, on that prior). So
-    it is where none differs: a fleck between the rays leaves no trace in them.
+    replicates, that says little: the pair may be lit a bit more or a bit less. Its error is what
+    c / n misses of the share under Jeffreys' prior, in the mean square (c + 3/4) / n² for few of
+    many rays (that prior: Brown, Cai and DasGupta 2001, Statistical Science 16, 101-133). So it is
+    where none differs: a fleck between the rays leaves no trace in them.
     """
     n_replicates = share.shape[1]
     mean = share.mean(axis=1)
