@@ -123,6 +123,12 @@ def beside_code(path):
     return local(short(SCRIPTS / "dapple" / path))
 
 
+REPORT_TEMPLATES = [
+    beside_code(f"report/templates/{file.name}")
+    for file in sorted((SCRIPTS / "dapple/report/templates").iterdir())
+]
+
+
 def data(path):
     """A file of real data, which the configuration names relative to data_dir."""
     file = Path(settings.data_dir) / path

@@ -103,6 +103,22 @@ FIGURES = {
 }
 
 
+# What stands below the figures of other studies.
+CAPTIONS = {
+    "survey/shadow_maps.png": "What the scans do not see, from above, in three slices of height.",
+    "survey/shadowing.png": "Relative shadow against the number of laser beams; the shade is the "
+    "range over virtual stands.",
+    "survey/filled_profile.png": "Filled voxels by height: all, hit, and reached by some beam.",
+    "survey/regression.png": "Contact frequency on the true share of filled voxels, by laser "
+    "coverage.",
+    "survey/profile.png": "Share of filled voxels by height: true, measured, corrected.",
+    "survey/plan.png": "Relative shadow against the number of scans: planner, designs, chance.",
+    "stability/map.png": "Median r by trouble (rows) and level (columns, harmless on the left); a "
+    "cross marks failure.",
+    "stability/curves.png": "r over the levels of each trouble; shades span the virtual worlds.",
+}
+
+
 for figure, about in FIGURES.items():
 
     rule:
@@ -141,7 +157,7 @@ for figure, about in FIGURES.items():
 rule page:
     input:
         made=[path for path in targets() if not path.endswith("report.html")],
-        code=code("page"),
+        code=code("page") + REPORT_TEMPLATES,
     output:
         page=results("report.html"),
     log:
@@ -152,10 +168,11 @@ rule page:
         "../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=500,
+        mem_mb=2000,
     params:
         experiment=settings.experiment,
-        captions={about["path"]: about["caption"] for about in FIGURES.values()},
+        captions={about["path"]: about["caption"] for about in FIGURES.values()}
+        | CAPTIONS,
     message:
         said("report.html")
     script:

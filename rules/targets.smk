@@ -9,7 +9,7 @@ PLOT_FIGURES = ("map", "field", "spectra", "simulated", "losses")
 
 
 def light_targets():
-    """Geometry, light, their comparison with records and with the per-timestep engine, a report."""
+    """Geometry, light, their comparison with records and with the per-timestep engine."""
     wanted = ["classes/scores.json"]
     wanted += [f"structure/{name}/summary.json" for name in settings.reconstructions]
     wanted += [f"structure/{name}/voxels.vox" for name in VOXELS]
@@ -23,7 +23,7 @@ def light_targets():
         wanted += ["statistics/overall.csv", "statistics/per_sensor.csv"]
         wanted += ["statistics/mixed_model.csv"]
     wanted += [about["path"] for about in FIGURES.values() if about["is_usual"]]
-    return [*wanted, "verdict.json", "runtime.csv", "report.html"]
+    return [*wanted, "verdict.json"]
 
 
 def survey_targets():
@@ -73,4 +73,7 @@ STUDY_TARGETS = {
 
 def targets():
     """What a plain run makes."""
-    return [results(path) for path in ["config.yaml", *STUDY_TARGETS[settings.study]()]]
+    wanted = STUDY_TARGETS[settings.study]()
+    return [
+        results(path) for path in ["config.yaml", *wanted, "runtime.csv", "report.html"]
+    ]

@@ -4,19 +4,19 @@ from pathlib import Path
 
 import pandas as pd
 
-from dapple.figures import plot_page
 from dapple.formats import json, rasters, tables
 from dapple.formats.atomic import atomic
+from dapple.report import plot_report
 from dapple.workflow import run
 
 
 def main(snakemake):
     inputs, params = snakemake.input, snakemake.params
     retrieved = [
-        plot_page.retrieved(taught, rasters.read(path).values, json.read(facts))
+        plot_report.retrieved(taught, rasters.read(path).values, json.read(facts))
         for taught, path, facts in zip(params.taught, inputs.maps, inputs.intervals, strict=True)
     ]
-    page = plot_page.build(
+    page = plot_report.build(
         params.plot,
         files=[json.read(path) for path in inputs.found],
         sun=json.read(inputs.sun),

@@ -1,7 +1,7 @@
 """Names that nothing uses, by vulture: `python tools/dead_code.py` prints them and then fails.
 
-vulture reads Python alone, so that what only a rule calls or reads looks dead to it, and what only
-a library calls or reads. Words of rules count as uses here; names of libraries are listed.
+vulture reads Python alone, so that what only a rule or a template reads looks dead to it, and what only
+a library calls or reads. Words of both count as uses here; names of libraries are listed.
 """
 
 import re
@@ -33,7 +33,8 @@ def main() -> int:
     known = " ".join([*OF_LIBRARIES.values(), BY_KIND]).split()
     seeker = vulture.Vulture(ignore_names=known)
     seeker.scavenge([str(ROOT / folder) for folder in FOLDERS])
-    for path in (ROOT / "Snakefile", *ROOT.glob("rules/**/*.smk")):
+    templates = ROOT.glob("scripts/**/*.j2")
+    for path in (ROOT / "Snakefile", *ROOT.glob("rules/**/*.smk"), *templates):
         for word in re.findall(r"\w+", path.read_text()):
             seeker.used_names.add(word)
     dead = seeker.get_unused_code(min_confidence=60)

@@ -271,7 +271,7 @@ rule plot_page:
         ],
         trees=[plot_file(f"retrieval/trees_{model}.csv") for model in RETRIEVAL.models],
         figures=[results(f"chlorophyll/{{plot}}_{name}.png") for name in PLOT_FIGURES],
-        code=code("plot_page"),
+        code=code("plot_page") + REPORT_TEMPLATES,
     output:
         page=results("chlorophyll/{plot}_report.html"),
     log:

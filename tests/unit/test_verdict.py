@@ -7,8 +7,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dapple import findings
-from dapple.figures import report
 from dapple.verdict import fitting, judgement
 from dapple.verdict.departure import MOST, departure
 from dapple.verdict.signal_meanings import OF_RECORDS, SIGNALS
@@ -244,38 +242,3 @@ def test_the_models_that_come_along_keep_what_was_promised_on_unseen_runs():
     rates = json.loads(judgement.MODEL.read_text())["records"]["rates"]["halves"]
     assert rates["detection"] >= 0.85
     assert rates["false_alarms"] <= 0.15
-
-
-# The page
-
-
-def test_the_page_opens_with_the_verdict_its_reasons_and_remedies(tmp_path, models):
-    signals = usual_signals(noise_share=3.0)
-    (tmp_path / "structure").mkdir()
-    judged = judgement.judge(signals, RECONSTRUCTIONS, models)
-    (tmp_path / "verdict.json").write_text(json.dumps(judged))
-    written = report.build("some <tree>", tmp_path, {})
-    assert written.index("Verdict") < written.index("Structure")
-    assert "the noise filter took 300% of the returns" in written
-    assert SIGNALS["noise_share"].help in written
-    assert "some &lt;tree&gt;" in written
-    (tmp_path / "verdict.json").unlink()
-    assert "Verdict" not in report.build("x", tmp_path, {})
-
-
-def test_the_page_tells_what_was_noticed_about_the_input_the_worst_first(tmp_path):
-    (tmp_path / "sky").mkdir()
-    noticed = [findings.note("a.csv", "3 rows twice"), findings.warning("a.csv", "a <gap>")]
-    facts = {"modelled_share_of_day": 0.25, "findings": findings.rows(noticed)}
-    (tmp_path / "sky/radiation.json").write_text(json.dumps(facts))
-    written = report.build("x", tmp_path, {})
-    assert written.index("a &lt;gap&gt;") < written.index("3 rows twice")
-    assert "at 25 % of the times with the sun up" in written
-    assert "noticed" not in report.build("x", tmp_path / "empty", {})
-
-
-def test_the_page_shows_the_figures_that_there_are_with_their_captions(tmp_path):
-    (tmp_path / "tree.png").write_bytes(b"a picture")
-    written = report.build("x", tmp_path, {"tree.png": "A <tree>.", "gap.png": "A gap."})
-    assert "<figcaption>A &lt;tree&gt;.</figcaption>" in written
-    assert "gap" not in written

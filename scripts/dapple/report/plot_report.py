@@ -1,20 +1,22 @@
 """One self-contained page about a plot whose chlorophyll was mapped."""
 
-import html
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from dapple.figures import report
+from dapple.report.blocks import Block, Listing, Section, number, picture, table
+from dapple.report.document import document
+from dapple.report.findings_list import noticed
+from dapple.report.quantities import CHLOROPHYLL
 
 CAPTIONS = {
     "map": "Retrieved chlorophyll, and the width of its interval.",
-    "field": "Retrieved against measured chlorophyll of trees.",
+    "field": "Retrieved chlorophyll of trees against what is known of them.",
     "spectra": "Observed canopy pixels, and those that taught the networks.",
-    "simulated": "Predictions of simulated entries against their truth.",
+    "simulated": "Predictions of simulated entries against what they were made with.",
     "losses": "Loss of the networks by epoch.",
 }
 TREE_COLUMNS = ("tree", "truth_ug_cm2", "predicted_ug_cm2", "low_ug_cm2", "high_ug_cm2",
@@ -79,23 +81,29 @@ def build(
     figures : sequence of Path
         Pictures, called {plot}_{name}.png.
     """
-    return report.page(
-        f"dapple: {plot}",
+    return document(
+        f"Leaf chlorophyll of {plot}",
+        _trust(retrieved, usual_outside, accuracy),
         [
-            f"<h1>Leaf chlorophyll of {html.escape(plot)}</h1>",
-            "<h2>What was read</h2>",
-            _facts(files, sun, sky, sky_told_by, crs),
-            report.noticed(files),
-            "<h2>What was retrieved</h2>",
-            report.table(retrieved),
-            _trust(retrieved, usual_outside, accuracy),
-            *_scores(accuracy, trees),
-            *(report.figure(path, CAPTIONS[path.stem.rpartition("_")[2]]) for path in figures),
+            Section("What was retrieved", [table(retrieved, "Maps", also=CHLOROPHYLL)]),
+            Section("What was noticed about the input", noticed(files)),
+            Section(
+                "Figures",
+                [picture(path, CAPTIONS[path.stem.rpartition("_")[2]]) for path in figures],
+            ),
+            Section("Scores", [*_scores(accuracy, trees)]),
+            Section("What was read", [_facts(files, sun, sky, sky_told_by, crs)]),
         ],
     )
 
 
-def _facts(files, sun, sky, sky_told_by, crs) -> str:
+def _facts(
+    files: Sequence[Mapping[str, Any]],
+    sun: Mapping[str, Any],
+    sky: Mapping[str, float],
+    sky_told_by: str,
+    crs: str,
+) -> Listing:
     rows = [("coordinate system", crs)]
     for facts in files:
         rows += [
@@ -106,37 +114,34 @@ def _facts(files, sun, sky, sky_told_by, crs) -> str:
     angles = f"zenith {sun['sun_zenith_deg']:.2f}°, azimuth {sun['sun_azimuth_deg']:.2f}°"
     rows.append(("sun", f"{angles} ({sun['told_by']})"))
     rows.append(("light from the sky", f"{_text(sky)} ({sky_told_by})"))
-    cells = "".join(
-        f"<tr><td>{html.escape(name)}</td><td>{html.escape(text)}</td></tr>" for name, text in rows
-    )
-    return f"<table>{cells}</table>"
+    return Listing(rows)
 
 
 def _text(value: Any) -> str:
     if isinstance(value, Mapping):
         return ", ".join(f"{name}: {_text(one)}" for name, one in value.items()) or "none"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return number(value, 4) if isinstance(value, float) and np.isfinite(value) else str(value)
 
 
-def _trust(retrieved: pd.DataFrame, usual_outside: float, accuracy: pd.DataFrame) -> str:
+def _trust(retrieved: pd.DataFrame, usual_outside: float, accuracy: pd.DataFrame) -> list[str]:
     """How far to trust the map, in words."""
     shares = retrieved["outside_share"].dropna().astype(float)
     if shares.empty:
-        return "<p><b>No cell has data: nothing was retrieved.</b></p>"
-    text = (
+        return ["No cell has data: nothing was retrieved."]
+    found = [
         f"By model, {100 * shares.min():.0f} to {100 * shares.max():.0f} % of the cells look "
-        f"unlike all that was simulated ({100 * usual_outside:.1f} % of what taught does): values "
-        "are extrapolated. Intervals hold for leaves and canopies as they were simulated."
-    )
+        f"unlike all that was simulated ({100 * usual_outside:.1f} % of what taught does): there, "
+        "values are extrapolated.",
+        "Intervals hold for leaves and canopies as they were simulated.",
+    ]
     if "field" not in set(accuracy["test_set"]):
-        text += " No measured tree tells how far these are from the truth."
-    return f"<p><b>How far to trust it.</b> {text}</p>"
+        found.append("No measured tree tells how far these are from what grows there.")
+    return found
 
 
-def _scores(accuracy: pd.DataFrame, trees: pd.DataFrame) -> list[str]:
+def _scores(accuracy: pd.DataFrame, trees: pd.DataFrame) -> Iterator[Block]:
     ensemble = accuracy[accuracy["seed"].astype(str) == "ensemble"]
-    parts = ["<h2>Scores</h2>", report.table(ensemble.dropna(axis=1, how="all"))]
+    yield table(ensemble.dropna(axis=1, how="all"), "Networks", also=CHLOROPHYLL)
     if len(trees):
         columns = [name for name in TREE_COLUMNS if name in trees]
-        parts += ["<h2>Trees</h2>", report.table(trees[columns])]
-    return parts
+        yield table(trees[columns], "Trees", also=CHLOROPHYLL)

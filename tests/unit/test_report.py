@@ -1,0 +1,179 @@
+"""The report: what it says first, that input is never taken for HTML, what columns mean."""
+
+import json
+import re
+
+import pandas as pd
+import pytest
+
+from dapple import findings
+from dapple.report import run_report
+from dapple.report.blocks import Section, Text, number, table
+from dapple.report.document import document
+from dapple.report.recommendation import sentences
+from dapple.verdict.signal_meanings import SIGNALS
+
+EVIL = "<script>alert(1)</script>"
+
+
+def judged(**states):
+    """A verdict on reconstructions, each with one reason."""
+    loss = {"green": 0.1, "amber": 0.5, "red": 0.9}
+    reason = {
+        "signal": "sparse_polygons",
+        "value": 0.66,
+        "usual": 0.27,
+        "text": "66% of the polygons are made of one or two points",
+        "usual_text": "27% of the polygons are made of one or two points",
+        "help": SIGNALS["sparse_polygons"].help,
+        "share": 1.0,
+        "is_beyond": False,
+    }
+    facts = {
+        name: {"state": state, "expected_loss": loss[state], "alarm": 0.4, "reasons": [reason]}
+        for name, state in states.items()
+    }
+    best = min(states.values(), key=list(loss).index)
+    return {"state": best, "reconstructions": facts, "with_records": True, "unknown": []}
+
+
+def overall(**rmse):
+    rows = [
+        {"reconstruction": name, "n": 90, "r": 0.9, "r_low": 0.8, "r_high": 0.95, "rmse": one,
+         "bias": -20.0, "mae": 50.0, "baseline_r": 0.3}
+        for name, one in rmse.items()
+    ]  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def written(folder, files, captions=()):
+    """The page of a folder with these files."""
+    for name, content in files.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if isinstance(content, pd.DataFrame):
+            content.to_csv(path, index=False)
+        else:
+            path.write_text(json.dumps(content))
+    return run_report.build("some run", folder, dict(captions))
+
+
+# What stands first
+
+
+def test_the_first_sentence_says_which_reconstruction_to_use_and_the_next_which_not():
+    said = sentences(judged(polygons="amber", voxels_1="red", surfels="green"), None)
+    assert said[0].startswith("Use surfels")
+    assert said[1].startswith("Polygons are doubtful: 66")
+    assert "undisturbed: 27" in said[1]
+    assert said[2].startswith("Do not use voxels of 1 m: ")
+
+
+def test_the_best_of_several_sound_ones_is_named_and_the_others_too():
+    verdict = judged(polygons="green", surfels="green")
+    verdict["reconstructions"]["surfels"]["expected_loss"] = 0.05
+    said = sentences(verdict, None)[0]
+    assert said.startswith("Use surfels")
+    assert said.endswith("Polygons can be used as well.")
+
+
+def test_nothing_is_recommended_where_all_are_red():
+    said = sentences(judged(polygons="red", voxels_1="red"), None)
+    assert said[0] == "Do not use the light of this run as it is."
+
+
+def test_where_none_is_beyond_doubt_the_least_doubtful_is_used_with_care():
+    assert sentences(judged(polygons="red", surfels="amber"), None)[0].startswith(
+        "Use surfels with care"
+    )
+
+
+def test_what_is_not_known_is_the_reason_where_no_signal_raised_the_alarm():
+    verdict = judged(polygons="amber")
+    verdict["reconstructions"]["polygons"]["expected_loss"] = 0.1
+    verdict["unknown"] = [{"lacks": "shots", "text": "nobody knows", "help": "Export pulses."}]
+    assert "Polygons are doubtful: nobody knows." in sentences(verdict, None)
+
+
+def test_records_choose_among_what_a_user_can_choose_and_say_where_the_verdict_doubts():
+    verdict = judged(polygons="amber", voxels_1="green")
+    said = sentences(verdict, overall(truth=1.0, polygons=100.0, voxels_1=300.0))[-1]
+    assert "90 records" in said
+    assert "polygons come nearest: r = 0.90, RMSE 100 and bias −20" in said
+    assert "their scan speaks against them" in said
+    said = sentences(verdict, overall(surfels=100.0))[-1]
+    assert "not known" in said
+
+
+def test_the_page_opens_with_the_sentence_and_never_calls_a_run_sound_while_one_is_red(tmp_path):
+    page = written(tmp_path, {"verdict.json": judged(polygons="red", surfels="green")})
+    assert page.index("Use surfels") < page.index("<h2>")
+    assert page.index("Do not use polygons") < page.index("<h2>")
+    assert SIGNALS["sparse_polygons"].help in page
+    assert "How far to trust it" not in written(tmp_path / "bare", {})
+
+
+# Input
+
+
+def test_what_comes_from_input_is_text_and_never_html(tmp_path):
+    table = overall(polygons=1.0).assign(reconstruction=EVIL)
+    note = findings.note(EVIL, EVIL)
+    page = written(
+        tmp_path,
+        {
+            "statistics/overall.csv": table,
+            "sky/radiation.json": {"findings": findings.rows([note])},
+        },
+    )
+    assert "<script>alert" not in page
+    assert page.count("&lt;script&gt;alert") >= 2
+    page = document(EVIL, [EVIL], [Section(EVIL, [Text([EVIL])])])
+    assert "<script>alert" not in page
+
+
+def test_the_page_tells_what_was_noticed_about_the_input_the_worst_first(tmp_path):
+    noticed = [findings.note("a.csv", "3 rows twice"), findings.warning("a.csv", "a <gap>")]
+    facts = {"modelled_share_of_day": 0.25, "findings": findings.rows(noticed)}
+    page = written(tmp_path, {"sky/radiation.json": facts})
+    assert page.index("a &lt;gap&gt;") < page.index("3 rows twice")
+    assert "at 25 % of the times with the sun up" in page
+    assert "noticed" not in written(tmp_path / "empty", {})
+
+
+# Tables and figures
+
+
+def test_the_page_shows_the_figures_that_there_are_with_their_captions(tmp_path):
+    (tmp_path / "tree.png").write_bytes(b"a picture")
+    page = written(tmp_path, {}, {"tree.png": "A <tree>.", "gap.png": "A gap."})
+    assert "<figcaption>A &lt;tree&gt;.</figcaption>" in page
+    assert "A gap" not in page
+
+
+def test_columns_have_units_and_meanings_and_cells_the_number_they_are_sorted_by(tmp_path):
+    page = written(tmp_path, {"statistics/overall.csv": overall(polygons=1234.5678)})
+    assert re.search(r'RMSE</abbr> <span class="unit">µmol m⁻² s⁻¹', page)
+    assert "Mean of simulated minus measured." in page
+    assert 'data-key="1234.5678">1\u2009235</td>' in page
+
+
+def test_a_page_without_charts_carries_no_library_of_charts():
+    assert len(document("x", [], [])) < 40_000
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0"), (0.98765, "0.988"), (-0.0123456, "−0.0123"), (123456.7, "123\u2009457"),
+        (99.96, "100"), (1e-9, "1.00e−09"),
+    ],
+)  # fmt: skip
+def test_numbers_have_three_digits_that_count(value, text):
+    assert number(value) == text
+
+
+def test_what_is_missing_is_a_dash_and_sorted_below_all_numbers():
+    shown = table(pd.DataFrame({"r": [0.5, float("nan")]}), "x")
+    assert [row[0].text for row in shown.rows] == ["0.500", "–"]
+    assert shown.rows[1][0].key < shown.rows[0][0].key
