@@ -7,6 +7,7 @@ Makes   figures/tree.png          the tree from the side and from above, with th
         figures/boxplot.png       correlation of every sensor by reconstruction
         figures/scatter.png       simulated against measured PAR
         figures/ground_map.png    PAR on the ground at four times
+        figures/*.pdf             the same figures as vectors, for print
         figures/advice.png        what refinements of the light change and cost
         tradeoff/chart.png        accuracy against speed
         report.html               one self-contained page
@@ -25,16 +26,18 @@ FIGURES = {
             "leaves": leaf_meshes("polygons")[0],
             "wood": results("structure/polygons/wood.ply"),
             "sensors": results("sky/sensors.csv"),
+            "ground": GROUND,
         },
+        "options": {"ground_z_m": GROUND_Z_M},
         "is_usual": bool(LIT),
     },
     "series": {
         "path": "figures/series.png",
         "drawn_by": "daily_courses",
         "category": "Light",
-        "caption": "Photosynthetically active radiation through the day: measured (points) and "
-        "simulated with each reconstruction (lines), at sensors from the worst to the best "
-        "correlation.",
+        "caption": "Photosynthetically active radiation through the day: measured (black) and "
+        "simulated with each reconstruction (lines), at sensors from the darkest to the "
+        "brightest.",
         "inputs": {
             "light": [results(f"light/{name}.nc") for name in LIT],
             "records": results("statistics/records.csv") if COMPARED else [],
@@ -77,6 +80,10 @@ FIGURES = {
         "inputs": {
             "map": results("light/ground_map.nc"),
             "wood": results("structure/polygons/wood.ply"),
+        },
+        "options": {
+            "times": settings.figures.map_times,
+            "timezone": settings.time.timezone,
         },
         "is_usual": bool(LIT),
     },
@@ -135,6 +142,7 @@ for figure, about in FIGURES.items():
                 caption="../docs/captions/figure.rst",
                 category=about["category"],
             ),
+            vector=results(about["path"].replace(".png", ".pdf")),
         log:
             logs(f"{figure}_figure"),
         benchmark:

@@ -9,7 +9,7 @@ Makes   light/transport/{reconstruction}_{placement}.nc counted paths: any sky, 
         light/reference/{reconstruction}.nc             its series
         light/less_timesteps/{reconstruction}/{batch}.nc
         light/less/{reconstruction}.nc                  the same by LESS 3, another independent check
-        light/ground_map.nc                             light on the ground at a few times
+        light/ground_map.nc                             light on the ground, hour by hour
         export/{reconstruction}/                        the scene for LESS 3 (`less3/`) and as glTF (`scene.glb`)
 """
 
@@ -287,8 +287,8 @@ rule ground_map:
         timezone=settings.time.timezone,
         spacing_m=settings.figures.map_spacing_m,
         margin_m=settings.figures.map_margin_m,
-        # Flux through the level, whatever the sensors are.
-        engine=REFERENCE | {"response": responses.COSINE},
+        tracing=tracing("sun_diameter_deg", "sun_kernel_deg")
+        | {"variant": f"{VARIANT}_mono"},
         ground_z_m=GROUND_Z_M,
         seed=stream("ground_map"),
     message:

@@ -9,7 +9,9 @@ from dapple.workflow import run
 def main(snakemake):
     params = snakemake.params
     drawing = import_module(f"dapple.figures.{params.drawn_by}")
-    style.save(drawing.of_run(snakemake.input, params.options), snakemake.output.figure)
+    figure = drawing.of_run(snakemake.input, params.options)
+    for path in snakemake.output:
+        style.save(figure, path)
 
 
 if __name__ == "__main__":

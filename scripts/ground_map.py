@@ -1,9 +1,11 @@
-"""Light on the ground around the tree at a few times."""
+"""Light on the ground around the tree, hour by hour."""
+
+import numpy as np
 
 from dapple.formats import netcdf
 from dapple.light.par_on_ground import par_on_ground
 from dapple.scene import scene_files, scene_optics
-from dapple.times import spread
+from dapple.times import hourly, spread
 from dapple.workflow import run
 
 
@@ -11,7 +13,12 @@ def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
     around = scene_files.around(inputs.ground or params.ground_z_m, inputs.shade)
     sky = netcdf.read(inputs.sky)
-    chosen = spread(netcdf.times(sky), params.times, 4, params.timezone)
+    times = netcdf.times(sky)
+    chosen = hourly(times, params.timezone)
+    is_day = sky["sun_zenith_deg"].to_numpy()[chosen] < 90
+    chosen = chosen[is_day] if is_day.any() else chosen
+    if params.times:
+        chosen = np.union1d(chosen, spread(times, params.times, 0, params.timezone))
     # One placement is what stands there at a time; a mean would blur its flecks.
     scene = scene_files.read(inputs.leaves[:1], inputs.wood, around)[0]
     par = par_on_ground(
@@ -21,8 +28,8 @@ def main(snakemake):
         scene_optics.read(inputs.optics),
         spacing_m=params.spacing_m,
         margin_m=params.margin_m,
-        engine=params.engine,
         seed=params.seed,
+        **params.tracing,
     )
     netcdf.write(snakemake.output.map, par)
 

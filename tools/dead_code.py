@@ -1,7 +1,7 @@
 """Names that nothing uses, by vulture: `python tools/dead_code.py` prints them and then fails.
 
-vulture reads Python alone, so that what only a rule or a template reads looks dead to it, and what only
-a library calls or reads. Words of both count as uses here; names of libraries are listed.
+vulture reads Python alone, so that what only a rule or a template reads looks dead to it, and what
+only a library calls or reads. Words of both count as uses here; names of libraries are listed.
 """
 
 import re

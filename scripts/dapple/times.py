@@ -177,3 +177,24 @@ def spread(times: pd.DatetimeIndex, wanted: Sequence[str], count: int, timezone:
         return np.unique(times.get_indexer(stamps, method="nearest"))
     inner = np.linspace(0, len(times) - 1, count + 2)[1:-1]
     return np.unique(inner.round().astype(int))
+
+
+def hourly(times: pd.DatetimeIndex, timezone: str, fewest: int = 4) -> np.ndarray:
+    """Indices of the times nearest to the full hours of one day, the one in the middle.
+
+    Parameters
+    ----------
+    times : (t,) DatetimeIndex
+        UTC, ascending.
+    timezone : str
+        IANA name or offset, by which hours and days are told.
+    fewest : int
+        Where there are fewer hours, so many times are spread instead.
+    """
+    local = times.tz_convert(timezones.find_timezone(timezone))
+    day = local[len(local) // 2].normalize()
+    own = np.flatnonzero(local.normalize() == day)
+    hours = pd.date_range(local[own[0]].ceil("h"), local[own[-1]].floor("h"), freq="h")
+    if len(hours) < fewest:
+        return own[spread(times[own], (), min(fewest, len(own)), timezone)]
+    return np.unique(own[local[own].get_indexer(hours, method="nearest")])

@@ -122,6 +122,11 @@ def test_the_same_data_give_the_same_bytes_whatever_the_caller_has_set(name, tmp
     first = (tmp_path / "first.png").read_bytes()
     assert first == (tmp_path / "second.png").read_bytes()
     assert b"tEXt" not in first
+    for number in "12":
+        style.save(FIGURES[name](), tmp_path / f"vector{number}.pdf")
+    vector = (tmp_path / "vector1.pdf").read_bytes()
+    assert vector == (tmp_path / "vector2.pdf").read_bytes()
+    assert b"Date" not in vector
     assert list(tmp_path.glob(".partial*")) == []
 
 
@@ -184,6 +189,16 @@ def test_what_stands_in_the_south_is_nearer_in_the_view_from_the_south():
     assert green > red
 
 
+def test_a_tree_high_above_nought_has_a_figure_of_its_own_size():
+    low, high = (
+        tree.draw(Scene(of_kinds(leaf=square((0, 0, z_m), 2)), ground_z_m=ground_m))
+        for z_m, ground_m in ((3.0, 0.0), (503.0, 0.0))
+    )
+    assert high.get_size_inches()[1] <= low.get_size_inches()[1]
+    on_the_hill = tree.draw(Scene(of_kinds(leaf=square((0, 0, 503), 0)), ground_z_m=502.0))
+    assert on_the_hill.axes[0].lines[0].get_ydata()[0] == 502.0
+
+
 def test_both_views_of_a_tree_have_one_scale():
     figure = tree.draw(Scene(of_kinds(leaf=square((0, 0, 3), 2), wood=square((0, 0, 2), 1))))
     scales = [
@@ -243,10 +258,19 @@ def test_components_are_the_light_that_is_not_direct():
     assert figure.axes[0].collections[0].get_paths()[0].vertices[:, 1].max() == pytest.approx(100)
 
 
-def test_sensors_are_chosen_from_the_worst_to_the_best():
-    chosen = daily_courses.choose_sensors(per_sensor(), reconstruction="polygons", count=2)
-    assert chosen == ["1_3", "2_1"]
-    assert daily_courses.choose_sensors(per_sensor(), reconstruction="voxels_0.2") == ["2_1", "1_1"]
+def test_sensors_are_chosen_evenly_from_the_darkest_to_the_brightest():
+    light = [50.0, 60, 70, 900, 1000, 1950, *[2000.0 + k for k in range(20)]]
+    shown = pd.DataFrame({"sensor": [f"s{k}" for k in range(len(light))], "measured": light})
+    chosen = daily_courses.choose_sensors(shown, count=4)
+    assert chosen[0] == "s0"
+    assert chosen[1] in ("s2", "s3")
+    assert sum(float(light[int(one[1:])]) > 1900 for one in chosen) == 1
+    assert daily_courses.choose_sensors(shown[:3]) == ["s0", "s1", "s2"]
+
+
+def test_sensors_are_chosen_where_nothing_was_measured_or_seen():
+    night = pd.DataFrame({"sensor": ["a", "b"] * 2, "simulated": 0.0})
+    assert daily_courses.choose_sensors(night) == ["a", "b"]
 
 
 def test_a_box_has_a_point_for_every_sensor_that_has_an_r():
@@ -285,5 +309,7 @@ def test_panels_of_the_scatter_share_axes_and_colours():
     first, second = (axes.collections[0] for axes in figure.axes[:2])
     assert first.norm is second.norm
     assert first.get_array().sum() == 90
+    # A single record shows on white.
+    assert np.mean(first.cmap(0.0)[:3]) < 0.85
     assert "r = 0.92 (0.90 to 0.94)" in figure.axes[0].texts[0].get_text()
     assert [axes.get_title(loc="left") for axes in figure.axes[:2]] == ["polygons", "voxels 0.2 m"]

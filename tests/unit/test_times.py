@@ -5,7 +5,7 @@ import pytest
 
 from dapple import timezones
 from dapple.errors import InputError
-from dapple.times import parse, spread, time_range, utc
+from dapple.times import hourly, parse, spread, time_range, utc
 
 
 def parsed(*texts, zone=None, name="time", **options):
@@ -150,3 +150,17 @@ def test_wanted_times_are_on_the_declared_clock():
     day = time_range("2023-12-21 10:00", "2023-12-21 18:00", 60, "America/Santiago")
     assert spread(day, ["2023-12-21 17:00"], 4, "America/Santiago").tolist() == [7]
     assert spread(day, ["2023-12-21 17:00Z"], 4, "America/Santiago").tolist() == [4]
+
+
+def test_hours_are_those_of_the_middle_day_on_its_clock():
+    days = time_range("2023-08-10 00:00", "2023-08-12 23:50", 10, "Asia/Kolkata")
+    chosen = days[hourly(days, "Asia/Kolkata")].tz_convert("Asia/Kolkata")
+    assert len(chosen) == 24
+    assert set(chosen.day) == {11}
+    assert set(chosen.minute) == {0}
+
+
+def test_a_run_of_less_than_some_hours_is_spread_and_one_of_one_time_is_kept():
+    short = time_range("2023-08-10 10:10", "2023-08-10 11:50", 10, "UTC")
+    assert len(hourly(short, "UTC")) == 4
+    assert hourly(short[:1], "UTC").tolist() == [0]

@@ -35,7 +35,6 @@ CLASSES = f"classify {POLYGONS} voxels*2 {traced(4)}"
 SCAN = f"scan clean {CLASSES}"
 PLANT = f"plant scan clean classify {POLYGONS} voxels*2 sensors {traced(5)}"  # the truth as well
 SKY = f"light*5 {checked(5)} {MAP} {COMPARED}"
-OWN_CHECK = f"{checked(5)} {MAP}"
 
 KEYS = {
     "plant={leaf_area_m2: 6}": PLANT,
@@ -58,11 +57,12 @@ KEYS = {
     "registration={origin_m: [1, 0, 0]}": "",  # a grid stands in the tree's own frame
     "light={transport: {max_orders: 8}}": f"transport*5 light*5 agreement {COMPARED}",
     "light={transport: {max_shadow_rays: 99}}": f"light*5 agreement {COMPARED}",
-    "light={timestep: {replicates: 5}}": OWN_CHECK,
+    "light={timestep: {replicates: 5}}": checked(5),
     "light={timestep: {step_min: 120}}": "timesteps*5 reference*5 agreement",
     # LESS 3: meshes in two batches, voxels at a few times in one
     "light={check_with: [timestep, less]}": "less_timesteps*8 less*5 agreement",
     "light={sun_diameter_deg: 0.5}": SKY,
+    "figures={map_times: [2023-08-10 12:30]}": MAP,
     "ground_z_m=-0.1": f"scan clean {CLASSES} sensors".replace(traced(4), traced(5)),
     "statistics={confidence: 0.9}": f"record_statistics {FIGURES}",
     "figures={map_spacing_m: 0.4}": MAP,
@@ -81,9 +81,10 @@ CODE = {
     "sky/sun.py": f"sky {SKY}",
     "sky/models/perez.py": f"sky {SKY}",
     "scene/sensors.py": f"sensors tree_figure {traced(5)}",
-    "light/paths.py": f"transport*5 light*5 agreement {COMPARED}",
-    "light/series.py": f"light*5 agreement {COMPARED}",
-    "light/timestep.py": OWN_CHECK,
+    "light/paths.py": f"transport*5 light*5 agreement {MAP} {COMPARED}",
+    "light/series.py": f"light*5 agreement {MAP} {COMPARED}",
+    "report/tree_view.py": "",
+    "light/timestep.py": checked(5),
     "light/moved_sensors.py": "verdict",
     "registration/fit.py": "",  # nothing is fitted
     "stats/correlation.R": f"record_statistics {FIGURES}",

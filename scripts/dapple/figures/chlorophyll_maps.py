@@ -87,7 +87,7 @@ def simulated(tests: pd.DataFrame, accuracy: pd.DataFrame, *, cells: int = 40) -
                 axes.hexbin(
                     own["truth_ug_cm2"], own["predicted_ug_cm2"],
                     gridsize=(cells, int(cells / np.sqrt(3))), extent=RANGE_UG_CM2 * 2,
-                    mincnt=1, cmap="YlGnBu", linewidths=0.1,
+                    mincnt=1, cmap=style.COUNT_MAP, linewidths=0.1,
                 )
             )  # fmt: skip
             _equality(axes)
@@ -251,7 +251,7 @@ def chlorophyll_map(
     if len(row):
         right.legend(loc="lower left", frameon=True, fontsize=7)
     known = np.isfinite(np.asarray(truth, float)).any()
-    left.set_title("retrieved, and crowns with their truth" if known else "retrieved")
+    left.set_title("retrieved, and crowns with what is known of them" if known else "retrieved")
     right.set_title("how far to trust it")
     for axes in (left, right):
         axes.grid(False)

@@ -17,27 +17,33 @@ from dapple.stats.pairs import simulated
 from dapple.timezones import find_timezone
 
 
-def choose_sensors(per_sensor: pd.DataFrame, *, reconstruction: str, count: int = 6) -> list[str]:
-    """Pick sensors evenly from the worst to the best r of one reconstruction.
+def choose_sensors(records: pd.DataFrame, *, count: int = 6) -> list[str]:
+    """Pick sensors whose mean light lies evenly between the darkest and the brightest.
+
+    Deep shade, partial shade and open sky are then all there, however many sensors stand in each.
 
     Parameters
     ----------
-    per_sensor : DataFrame
-        `reconstruction, sensor, r`.
-    reconstruction : str
-        Whose r ranks the sensors.
+    records : DataFrame
+        `sensor` and `measured`, or `simulated` where nothing was measured.
     count : int
         How many; all where there are fewer.
 
     Returns
     -------
     list of str
-        Worst first.
+        Darkest first.
     """
-    own = per_sensor[per_sensor["reconstruction"] == reconstruction].dropna(subset="r")
-    ranked = own.sort_values(["r", "sensor"])["sensor"].to_list()
-    places = np.linspace(0, len(ranked) - 1, min(count, len(ranked))).round().astype(int)
-    return [ranked[place] for place in places]
+    light = records["measured" if "measured" in records else "simulated"]
+    mean = light.groupby(records["sensor"].to_numpy()).mean().dropna().sort_values(kind="stable")
+    if len(mean) <= count:
+        return list(mean.index)
+    wanted = np.linspace(mean.iloc[0], mean.iloc[-1], count)
+    chosen: list[str] = []
+    for value in wanted:
+        left = mean.drop(chosen)
+        chosen.append(str((left - value).abs().idxmin()))
+    return list(mean.index[mean.index.isin(chosen)])
 
 
 def of_run(inputs: Mapping[str, Any], options: Mapping[str, Any]) -> Figure:
@@ -48,22 +54,20 @@ def of_run(inputs: Mapping[str, Any], options: Mapping[str, Any]) -> Figure:
     inputs : mapping
         Paths.
     options : mapping
-        `sensors` to draw (none: chosen by their correlation, or spread over the plan),
+        `sensors` to draw (none: from the darkest to the brightest),
         `reconstructions` of the light, `timezone` of the axis.
     """
     names, chosen = options["reconstructions"], list(options["sensors"])
     if inputs["records"]:
         records = tables.read(inputs["records"])
         r = measures.per_sensor(records)
-        chosen = chosen or choose_sensors(r, reconstruction=names[0])
     else:
         light = zip(names, inputs["light"], strict=True)
         parts = [simulated(netcdf.read(path), name) for name, path in light]
         records, r = pd.concat(parts, ignore_index=True), None
-    # Without records, or without light to compare them by, sensors are spread over the plan.
-    labels = records["sensor"].unique()
-    chosen = chosen or list(labels[:: max(1, len(labels) // 6)][:6])
-    return draw(records, chosen, timezone=options["timezone"], per_sensor=r)
+    return draw(
+        records, chosen or choose_sensors(records), timezone=options["timezone"], per_sensor=r
+    )
 
 
 @style.styled

@@ -12,11 +12,16 @@ from matplotlib.figure import Figure
 from dapple.figures import style
 from dapple.formats import meshes, netcdf
 from dapple.structure.stem import stem_position
+from dapple.times import spread
 
 
 def of_run(inputs: Mapping[str, Any], options: Mapping[str, Any]) -> Figure:
-    """From the files of a run: `map` and `wood`, where the stem is."""
+    """From the files of a run: `map` and `wood`, where the stem is.
+
+    Options are `times` to draw (none: four spread ones) and the `timezone` that they are in.
+    """
     data = netcdf.read(inputs["map"])
+    data = data.isel(time=spread(netcdf.times(data), options["times"], 4, options["timezone"]))
     sun = data[["sun_zenith_deg", "sun_azimuth_deg"]].to_dataframe()
     stem = stem_position(meshes.read_ply(inputs["wood"]))
     return draw(data["par_umol_m2_s"], stem_m=tuple(stem[:2]), sun=sun)

@@ -66,7 +66,7 @@ def _panel(axes: Axes, own: pd.DataFrame, top: float, cells: int):
         gridsize=(cells, int(cells / np.sqrt(3))),
         extent=(0, top, 0, top),
         mincnt=1,
-        cmap="YlGnBu",
+        cmap=style.COUNT_MAP,
         linewidths=0.1,
     )
     axes.plot([0, top], [0, top], color="#222222", linewidth=0.8, linestyle=(0, (4, 3)))

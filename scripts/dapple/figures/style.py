@@ -29,6 +29,11 @@ LEAF, WOOD, SENSOR, SCANNER = "#5C9A3B", "#7A5638", "#C03A2B", "#3B3F8F"
 LIGHT_MAP = "cividis"
 # From a yellow that shows on white.
 DENSITY_MAP = ListedColormap(mpl.colormaps["YlGn"](np.linspace(0.18, 1, 256)), "density")
+COUNT_MAP = ListedColormap(mpl.colormaps["YlGnBu"](np.linspace(0.3, 1, 256)), "count")
+NOTHING_BUT_THE_PICTURE: dict[str, dict[str, None]] = {
+    "png": {"Software": None},
+    "pdf": {"Creator": None, "Producer": None, "CreationDate": None},
+}
 
 SETTINGS = {
     "font.family": "DejaVu Sans",  # comes with Matplotlib: the same glyphs on every machine
@@ -93,8 +98,9 @@ def new_figure(width_in: float, height_in: float) -> Figure:
 
 
 def save(figure: Figure, path: str | Path) -> None:
-    """Write a PNG that holds nothing but the picture: no date, no version of a program."""
+    """Write a picture, PNG or PDF by its name, that holds no date and no version of a program."""
     with atomic(path) as partial, mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(SETTINGS)
-        figure.savefig(partial, format="png", dpi=DPI, metadata={"Software": None})
+        kind = partial.suffix.removeprefix(".")
+        figure.savefig(partial, format=kind, dpi=DPI, metadata=NOTHING_BUT_THE_PICTURE[kind])

@@ -1,7 +1,7 @@
 """The reconstructed tree from the side and from above, with sensors and scan positions."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from dapple.figures import painter, style
-from dapple.formats import tables
+from dapple.formats import ground_surface, tables
 from dapple.formats.meshes import Mesh
 from dapple.scene import scene_files
 from dapple.scene.surfaces import Scene, Surface
@@ -40,8 +40,16 @@ ABOVE = View("from above", 0, 1, 2, 1.0, ("east [m]", "north [m]"))
 
 
 def of_run(inputs: Mapping[str, Any], options: Mapping[str, Any]) -> Figure:
-    """From the files of a run: `leaves`, `wood`, `sensors`."""
+    """From the files of a run: `leaves`, `wood`, `sensors`, and `ground` where it is not flat.
+
+    Options are `ground_z_m` of flat ground.
+    """
     scene = scene_files.read([inputs["leaves"]], inputs["wood"])[0]
+    ground_z_m = options["ground_z_m"]
+    if inputs["ground"]:
+        middle_m = scene.bounds_m.mean(axis=0)[None, :2]
+        ground_z_m = float(ground_surface.read(inputs["ground"]).height_m(middle_m)[0])
+    scene = replace(scene, ground_z_m=ground_z_m)
     return draw(scene, sensors=tables.read(inputs["sensors"]))
 
 
@@ -72,7 +80,10 @@ def draw(
     """
     low, high = _bounds(scene, sensors)
     low, high = low - margin_m, high + margin_m
-    low[2] = min(scene.ground_z_m, low[2] + margin_m) - 0.15
+    height_m, bottom_m = high[2] - low[2], low[2] + margin_m
+    # Ground that lies farther below than the plants are high is not theirs.
+    is_grounded = bottom_m - scene.ground_z_m < height_m
+    low[2] = (min(scene.ground_z_m, bottom_m) if is_grounded else bottom_m) - 0.15
     figure, panels, bar_axes = _panels(high - low, scene.voxels is not None)
     norm = _density_norm(scene.voxels)
     for axes, view in zip(panels, (SIDE, ABOVE), strict=True):
@@ -88,7 +99,8 @@ def draw(
         if scene.voxels is not None:
             squares = _voxel_layer(axes, scene.voxels, view, norm)
         _points(axes, view, sensors, scan_positions_m, low, high)
-    panels[0].axhline(scene.ground_z_m, color="#A89F91", linewidth=1.0, zorder=1)
+    if is_grounded:
+        panels[0].axhline(scene.ground_z_m, color="#A89F91", linewidth=1.0, zorder=1)
     if scene.voxels is not None:
         bar = figure.colorbar(squares, cax=bar_axes)
         bar.set_label("plant area along the line of sight [m² m⁻²]")
