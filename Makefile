@@ -8,6 +8,7 @@ run: setup
 	$(BIN)/snakemake --cores $(CORES)
 
 test: setup lint
+	@tools/browser
 	$(BIN)/python -m pytest -q -n $(CORES) --dist loadfile
 
 setup:

@@ -5,12 +5,14 @@ import re
 
 import pandas as pd
 import pytest
+import yaml
 
 from dapple import findings
-from dapple.report import run_report
+from dapple.report import methods, run_report
 from dapple.report.blocks import Section, Text, number, table
 from dapple.report.document import document
 from dapple.report.recommendation import sentences
+from dapple.report.references import REFERENCES
 from dapple.verdict.signal_meanings import SIGNALS
 
 EVIL = "<script>alert(1)</script>"
@@ -177,3 +179,28 @@ def test_what_is_missing_is_a_dash_and_sorted_below_all_numbers():
     shown = table(pd.DataFrame({"r": [0.5, float("nan")]}), "x")
     assert [row[0].text for row in shown.rows] == ["0.500", "–"]
     assert shown.rows[1][0].key < shown.rows[0][0].key
+
+
+def test_the_methods_cite_what_the_configuration_used_and_no_more(tmp_path):
+    settings = {
+        "study": "light",
+        "source": "cloud",
+        "reconstructions": ["polygons"],
+        "radiation": {"kind": "table", "sky": "isotropic"},
+        "light": {"engine": "less"},
+    }
+    (tmp_path / "config.yaml").write_text(yaml.safe_dump(settings))
+    text, cited, bibtex = methods.blocks(tmp_path)
+    assert "polygon in each small voxel (Frey et al. 2025)" in text.paragraphs[0]
+    assert "traced at each time with LESS (Qi et al. 2019)" in text.paragraphs[0]
+    assert "{" not in text.paragraphs[0]
+    assert "Pimont" not in "".join(one for _, one in cited.items)
+    assert "@article{frey2025," in bibtex.text
+    assert bibtex.text.count("@") == len(cited.items)
+
+
+def test_every_reference_is_an_entry_that_bibtex_can_read():
+    for key, reference in REFERENCES.items():
+        entry = reference.bibtex(key)
+        assert entry.count("{") == entry.count("}")
+        assert str(reference.year) in reference.cited()

@@ -3,16 +3,13 @@
 import base64
 
 import numpy as np
-import pandas as pd
 import pytest
-import xarray as xr
-import yaml
+from tests import made_up_run
+from tests.made_up_run import leaves
 
-from dapple.formats import meshes, netcdf
-from dapple.formats.meshes import Mesh
+from dapple.formats import meshes
 from dapple.report import ground_view, packing, residuals, run_light, sensor_view, tree_view
 
-TIMES = pd.date_range("2023-08-10 10:00", periods=12, freq="10min")
 LABELS = ["1_1", "1_10"]
 
 
@@ -22,68 +19,10 @@ def unpacked(packed):
     return values.reshape(packed["shape"])
 
 
-def leaves(n):
-    """n leaves of 2 cm² each, of two triangles."""
-    corners = np.array([[0, 0, 0], [0.02, 0, 0], [0.02, 0.01, 0], [0, 0.01, 0]])
-    vertices = np.concatenate([corners + np.array([0.1 * k, 0, 1]) for k in range(n)])
-    faces = np.concatenate([[[4 * k, 4 * k + 1, 4 * k + 2], [4 * k, 4 * k + 2, 4 * k + 3]]
-                            for k in range(n)]).astype(np.int32)  # fmt: skip
-    return Mesh(vertices, faces, np.repeat(np.arange(n, dtype=np.int32), 2))
-
-
-def dataset(variables, coords):
-    """A dataset whose variables say what they are."""
-    about = {"units": "1", "long_name": "made up"}
-    named = {name: (*variable, about) for name, variable in variables.items()}
-    times = netcdf.time_coordinate(coords["time"].tz_localize("UTC"))
-    return xr.Dataset(named, coords | {"time": times})
-
-
 @pytest.fixture
 def folder(tmp_path):
     """A run with two reconstructions, two sensors, records and a map of the ground."""
-    settings = {
-        "reconstructions": ["polygons", "truth"],
-        "site": {"timezone": "Europe/Berlin"},
-        "seed": 1,
-    }
-    (tmp_path / "config.yaml").write_text(yaml.safe_dump(settings))
-    sky = dataset(
-        {
-            "sun_zenith_deg": ("time", np.linspace(50, 40, 12)),
-            "sun_azimuth_deg": ("time", np.linspace(120, 150, 12)),
-            "beam_normal_umol_m2_s": (("time", "band"), np.full((12, 1), 1500.0)),
-            "diffuse_horizontal_umol_m2_s": (("time", "band"), np.full((12, 1), 200.0)),
-        },
-        {"time": TIMES},
-    )
-    netcdf.write(tmp_path / "sky/sky.nc", sky)
-    sensors = pd.DataFrame({"sensor": LABELS, "x_m": [0.0, 1.0], "y_m": 0.5, "z_m": 0.1})
-    sensors.to_csv(tmp_path / "sky/sensors.csv", index=False)
-    for name in settings["reconstructions"]:
-        direct = np.zeros((2, 12))
-        direct[0, 3:6] = 1000.0
-        parts = {"par": direct + 100.0, "par_direct": direct}
-        data = {f"{key}_umol_m2_s": (("sensor", "time"), one) for key, one in parts.items()}
-        netcdf.write(
-            tmp_path / f"light/{name}.nc", dataset(data, {"sensor": LABELS, "time": TIMES})
-        )
-    (tmp_path / "statistics").mkdir()
-    rows = [
-        {"reconstruction": name, "sensor": label, "time": time.tz_localize("UTC"),
-         "measured": 300.0, "simulated": 300.0 + off, "direct": 0.0, "part": "reporting"}
-        for name, off in (("polygons", 50.0), ("truth", 0.0))
-        for label in LABELS
-        for time in TIMES
-    ]  # fmt: skip
-    pd.DataFrame(rows).to_csv(tmp_path / "statistics/records.csv", index=False)
-    scores = [(name, label, 0.9, 50.0 if name == "polygons" else 1.0, 0.0)
-              for name in ("polygons", "truth") for label in LABELS]  # fmt: skip
-    columns = ["reconstruction", "sensor", "r", "rmse", "bias"]
-    pd.DataFrame(scores, columns=columns).to_csv(
-        tmp_path / "statistics/per_sensor.csv", index=False
-    )
-    return tmp_path
+    return made_up_run.write(tmp_path)
 
 
 def test_places_are_known_to_a_millimetre():
@@ -128,7 +67,7 @@ def test_the_chart_of_sensors_has_their_series_records_and_scores_by_label(folde
     assert unpacked(data["simulated"]).shape == (2, 2, 12)
     assert unpacked(data["simulated"])[0, 0, 4] == 1100
     assert (unpacked(data["records"]["par"]) == 300).all()
-    assert data["rmse"] == [[50.0, 50.0], [1.0, 1.0]]
+    assert data["rmse"] == [[50.0, 50.0], [0.0, 0.0]]
     # The truth fits best, but nobody who has a scan could choose it.
     assert data["names"][data["first"]] == "polygons"
     assert [row[0].text for row in by_reconstruction.rows] == ["polygons", "truth"]
@@ -153,13 +92,8 @@ def test_residuals_are_means_of_simulated_minus_measured_by_local_hour(folder):
 
 
 def test_the_slider_has_the_map_and_the_sun_of_every_stored_time(folder):
-    par = np.arange(24.0).reshape(2, 3, 4)
-    data = {"par_umol_m2_s": (("time", "y", "x"), par)}
-    data |= {"sun_zenith_deg": ("time", [50.0, 40]), "sun_azimuth_deg": ("time", [120.0, 150])}
-    coords = {"time": TIMES[::6], "y": np.arange(3) + 0.5, "x": np.arange(4) + 0.5}
-    netcdf.write(folder / "light/ground_map.nc", dataset(data, coords))
     (chart,) = ground_view.blocks(run_light.read(folder), folder)
-    assert unpacked(chart.data["par"]).tolist() == par.tolist()
+    assert unpacked(chart.data["par"]).tolist() == made_up_run.PAR_ON_GROUND.tolist()
     assert chart.data["times"] == ["2023-08-10 12:00:00", "2023-08-10 13:00:00"]
     assert chart.data["height_deg"] == [40.0, 50.0]
 

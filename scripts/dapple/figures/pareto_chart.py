@@ -192,6 +192,18 @@ def page(points: pd.DataFrame, title: str) -> str:
     title : str
         Of the page.
     """
+    figure = to_explore(points).update_layout(title=title)
+    return figure.to_html(include_plotlyjs=True, full_html=True, div_id="tradeoff")
+
+
+def to_explore(points: pd.DataFrame) -> go.Figure:
+    """The same chart, which answers to the mouse.
+
+    Parameters
+    ----------
+    points : DataFrame
+        As `advice.tradeoff.table` makes it.
+    """
     figure = make_subplots(1, 2, subplot_titles=_titles(points), horizontal_spacing=0.08)
     for column, error in enumerate(ERRORS, 1):
         for label, colour, engine, own in groups(points):
@@ -241,7 +253,6 @@ def page(points: pd.DataFrame, title: str) -> str:
         showarrow=False,
         font={"size": 11, "color": "#444"},
     )
-    figure.update_layout(
-        title=title, template="plotly_white", height=650, margin={"b": 110}, hovermode="closest"
+    return figure.update_layout(
+        template="plotly_white", height=650, margin={"b": 110}, hovermode="closest"
     )
-    return figure.to_html(include_plotlyjs=True, full_html=True, div_id="tradeoff")

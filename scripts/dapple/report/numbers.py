@@ -1,13 +1,14 @@
 """Numbers of a run as tables, each where its file is there."""
 
 from collections.abc import Iterator, Mapping
+from json import loads
 from pathlib import Path
 
 import pandas as pd
 
-from dapple.figures import style
+from dapple.figures import pareto_chart, style
 from dapple.formats import json, tables
-from dapple.report.blocks import Block, Table, table
+from dapple.report.blocks import Block, Chart, Table, table
 from dapple.report.quantities import CHLOROPHYLL, REFLECTANCE, Quantity
 
 COMPARED = {
@@ -83,3 +84,15 @@ def structure(folder: Path) -> Iterator[Block]:
 
 def _is_plain(value: object) -> bool:
     return value is None or isinstance(value, int | float | str)
+
+
+def tradeoff(folder: Path) -> Iterator[Block]:
+    """Accuracy against speed, where it was tried."""
+    path = folder / "tradeoff/points.csv"
+    if path.is_file():
+        caption = (
+            "Error against the time that it costs, of every setting that was tried: point at one "
+            "to read its settings. The dashed line joins those that no other beats."
+        )
+        chart = pareto_chart.to_explore(tables.read(path)).to_json()
+        yield Chart("tradeoff", "figure", caption, loads(chart))

@@ -24,7 +24,9 @@ def places(values_m: np.ndarray) -> dict[str, Any]:
     span = float(np.ptp(values_m, axis=0).max()) if len(values_m) else 0.0
     step_m = max(0.001, span / 65_000)
     steps = np.round((values_m - low) / step_m)
-    return _packed(steps.astype("<u2")) | {"low_m": low.tolist(), "step_m": step_m}
+    high = low + (steps.max(axis=0) if len(steps) else 0) * step_m
+    about = {"low_m": low.tolist(), "high_m": high.tolist(), "step_m": step_m}
+    return _packed(steps.astype("<u2")) | about
 
 
 def _packed(values: np.ndarray) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from dapple.formats import json
 from dapple.report import (
     findings_list,
     ground_view,
+    methods,
     numbers,
     plot_report,
     provenance,
@@ -60,8 +61,10 @@ def build(experiment: str, folder: Path, captions: Mapping[str, str]) -> str:
         Section("Where it is off", [*residuals.blocks(run)] if run else ()),
         Section("Numbers", [*numbers.of_files(folder, numbers.COMPARED)]),
         Section("Structure", [*numbers.structure(folder)]),
+        Section("Accuracy against speed", [*numbers.tradeoff(folder)]),
         Section("Tables", [*numbers.of_files(folder, numbers.OF_STUDIES)]),
         Section("Figures", [picture(folder / name, captions[name]) for name in made]),
+        Section("How it was computed", [*methods.blocks(folder)]),
         Section("What it cost", [*provenance.cost(folder)], is_folded=True),
         Section("Configuration", [*provenance.configuration(folder)], is_folded=True),
         Section("Versions", [provenance.versions()], is_folded=True),

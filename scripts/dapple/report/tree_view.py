@@ -20,14 +20,15 @@ VOXELS = 8_000
 
 def blocks(folder: Path, names: list[str], first: str) -> Iterator[Block]:
     """A chart of all reconstructions of a folder, one shown at a time."""
-    shown = [_of_one(folder / f"structure/{name}", name) for name in names]
-    shown = [one for one in shown if one is not None]
+    found = (_of_one(folder / f"structure/{name}", name) for name in names)
+    shown = [one for one in found if one is not None]
     if not shown:
         return
     wood = _wood(folder, names)
     neighbours = folder / "tree/neighbours.ply"
     sensors = folder / "sky/sensors.csv"
     data = {
+        "box_m": _box(shown, wood),
         "shown": shown,
         "first": next((k for k, one in enumerate(shown) if one["name"] == first), 0),
         "wood": wood,
@@ -66,6 +67,16 @@ def _of_one(folder: Path, name: str) -> dict[str, Any] | None:
         one = _sample(meshes.read_ply(leaves), LEAF_TRIANGLES, is_enlarged=True)
         return facts | {"leaves": one, "n": one["n"], "n_shown": one["n_shown"]}
     return None
+
+
+def _box(shown: list[dict[str, Any]], wood: dict[str, Any]) -> list[list[float]]:
+    """Lowest and highest corner of the tree [m], with half its width around it for its shadow."""
+    packed = [one.get("centres") or one["leaves"]["corners"] for one in shown]
+    packed += [one["corners"] for one in wood.values()]
+    low = np.min([one["low_m"] for one in packed], axis=0)
+    high = np.max([one["high_m"] for one in packed], axis=0)
+    around = 0.5 * (high - low).max() * np.array([1, 1, 0])
+    return [(low - around).tolist(), (high + around).tolist()]
 
 
 def _wood(folder: Path, names: list[str]) -> dict[str, Any]:

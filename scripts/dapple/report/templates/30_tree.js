@@ -5,7 +5,7 @@ charts.tree = (figure, data) => {
   const controls = figure.querySelector(".controls");
   const told = figure.querySelector(".told");
   const state = { shown: data.first, leaves: true, wood: true, sensors: true, ground: null };
-  const eye = { x: 0.72, y: -1.02, z: 0.3 };
+  const eye = { x: 0.8, y: -1.1, z: 0.4 };
 
   function triangles(corners, colour, name) {
     const [x, y, z] = places(corners);
@@ -99,7 +99,7 @@ charts.tree = (figure, data) => {
     element(controls, "button", { type: "button" }, text).addEventListener("click", () => turn(by));
   }
   document.addEventListener("dapple:time", (event) => {
-    state.ground = event.detail.in3d(data.sensors ? Math.min(...data.sensors.z) : 0);
+    state.ground = event.detail.in3d(data.box_m, data.sensors);
     redraw();
   });
   redraw();

@@ -68,22 +68,30 @@ charts.ground = (figure, data) => {
     told.textContent = `${words(k)}; mean PAR of the map ${mean(k).toFixed(0)} ${PAR}.`;
     slider.setAttribute("aria-valuetext", words(k));
     shown.textContent = `${data.times[k].slice(11, 16)} (${data.timezone})`;
-    document.dispatchEvent(new CustomEvent("dapple:time", { detail: { in3d: (z) => in3d(k, z) } }));
+    const detail = { in3d: (box, under) => in3d(k, box, under) };
+    document.dispatchEvent(new CustomEvent("dapple:time", { detail }));
   }
 
-  // The same map lying under the tree, and the sun at its edge, as high as it stands.
-  function in3d(k, level) {
-    const middle = [0, 1].map((axis) => (low[axis] + high[axis]) / 2);
-    const reach = 0.5 * Math.hypot(high[0] - low[0], high[1] - low[1]);
+  // The part of the map below and around the tree, and the sun in its direction.
+  function in3d(k, box, sensors) {
+    const level = sensors && sensors.z.length ? Math.min(...sensors.z) - 0.1 : box[0][2];
+    const inside = (axis) => (value) => box[0][axis] <= value && value <= box[1][axis];
+    const x = data.x_m.filter(inside(0)), y = data.y_m.filter(inside(1));
+    const left = data.x_m.findIndex(inside(0));
+    const own = map(k).filter((_, row) => inside(1)(data.y_m[row]))
+      .map((row) => row.slice(left, left + x.length));
+    const middle = [0, 1].map((axis) => (box[0][axis] + box[1][axis]) / 2);
     const [up, round] = [data.height_deg[k], data.azimuth_deg[k]].map((d) => (d * Math.PI) / 180);
-    const flat = reach * Math.cos(up);
-    const at = [middle[0] + flat * Math.sin(round), middle[1] + flat * Math.cos(round),
-      level + reach * Math.sin(up)];
+    const half = Math.min(box[1][0] - box[0][0], box[1][1] - box[0][1]) / 2;
+    const reach = Math.min(half / Math.max(Math.cos(up), 0.01),
+      (1.25 * (box[1][2] - level)) / Math.max(Math.sin(up), 0.01));
+    const at = [middle[0] + reach * Math.cos(up) * Math.sin(round),
+      middle[1] + reach * Math.cos(up) * Math.cos(round), level + reach * Math.sin(up)];
     return [
       {
-        type: "surface", x: data.x_m, y: data.y_m, z: map(k).map((row) => row.map(() => level - 0.1)),
-        surfacecolor: map(k), cmin: 0, cmax: data.top, colorscale: COLOURS, showscale: false,
-        hoverinfo: "skip", lighting: { ambient: 1, diffuse: 0, specular: 0 },
+        type: "surface", x, y, z: own.map((row) => row.map(() => level)), surfacecolor: own,
+        cmin: 0, cmax: data.top, colorscale: COLOURS, showscale: false, hoverinfo: "skip",
+        lighting: { ambient: 1, diffuse: 0, specular: 0 },
       },
       {
         type: "scatter3d", mode: "lines+markers", x: [at[0], middle[0]], y: [at[1], middle[1]],
