@@ -13,7 +13,8 @@ import vulture
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("scripts", "benchmarks", "tools", "tests")
 OF_LIBRARIES = {
-    "pytest": "test_* one_thread",
+    "pytest": "test_* one_thread pytestmark",
+    "selenium": "binary_location",
     "pydantic": "model_config handler",
     "vulture": "used_names",
     "Mitsuba and Dr.Jit": "m_flags parameters_changed eta sampled_type sampled_component maxt",
