@@ -119,7 +119,16 @@ def _clouds(folder: Path) -> list[Seed]:
         data["intensity"] = np.linspace(0, 1, len(XYZ))
         file.write_scan_raw(data, translation=np.array([1.0, 2.0, 3.0]))
         file.write_scan_raw(data, translation=np.array([9.0, 2.0, 3.0]))
-    names = ("points.las", "points.laz", "points.ply", "old.las", "old.laz", "scans.e57")
+    fields = np.dtype([(axis, "<f8") for axis in "xyz"])
+    head = (
+        "VERSION 0.7\nFIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 120\nHEIGHT 1\n"
+        f"VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {len(XYZ)}\nDATA binary\n"
+    )
+    (folder / "points.pcd").write_bytes(head.encode() + XYZ.ravel().view(fields).tobytes())
+    names = (
+        *("points.las", "points.laz", "points.ply", "old.las", "old.laz", "scans.e57"),
+        "points.pcd",
+    )
     return [Seed(folder / name, read_cloud, False) for name in names]
 
 

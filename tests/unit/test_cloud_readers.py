@@ -491,3 +491,47 @@ def test_a_ptx_that_claims_more_shots_than_fit_is_refused_before_memory_is_taken
     (tmp_path / "a.ptx").write_text(head + "0 0 0 0.5\n" * 100)
     with pytest.raises(InputError, match=r"1,000,000 × 1,000,000 shots in the header of scan 1"):
         clouds.read(tmp_path / "a.ptx")
+
+
+# --- PCD ------------------------------------------------------------------------------------
+
+
+def pcd(path, xyz, kind="binary", points=None, size=8):
+    """Points with an intensity, as the Point Cloud Library writes them."""
+    header = (
+        f"# .PCD v0.7\nVERSION 0.7\nFIELDS x y z intensity\nSIZE {size} {size} {size} 4\n"
+        f"TYPE F F F F\nCOUNT 1 1 1 1\nWIDTH {len(xyz)}\nHEIGHT 1\n"
+        f"VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {len(xyz) if points is None else points}\nDATA {kind}\n"
+    )
+    if kind == "ascii":
+        body = "".join(f"{x:.4f} {y:.4f} {z:.4f} 0.5\n" for x, y, z in xyz).encode()
+    else:
+        rows = np.zeros(len(xyz), [(n, f"<f{size}") for n in "xyz"] + [("intensity", "<f4")])
+        for k, name in enumerate("xyz"):
+            rows[name] = xyz[:, k]
+        rows["intensity"] = 0.5
+        body = rows.tobytes()
+    path.write_bytes(header.encode() + body)
+    return path
+
+
+@pytest.mark.parametrize("kind", ["ascii", "binary"])
+def test_pcd_is_read_and_its_empty_points_are_shots_that_met_nothing(tmp_path, kind):
+    given = XYZ.copy()
+    given[7] = np.nan
+    cloud, source = clouds.read_with_source(pcd(tmp_path / "a.pcd", given, kind))
+    assert cloud.world_xyz_m == pytest.approx(np.delete(XYZ, 7, axis=0), abs=1e-9)
+    assert dict(source.left_out) == {MISSED: 1}
+    assert len(cloud.attributes["RelativeIntensity"]) == 399
+
+
+def test_pcd_that_lost_its_millimetres_claims_too_much_or_is_compressed_is_refused(tmp_path):
+    with pytest.raises(InputError, match="32-bit floats"):
+        clouds.read(pcd(tmp_path / "a.pcd", XYZ + np.array([5e5, 5.3e6, 0.0]), size=4))
+    with pytest.raises(InputError, match="1000000000 points in"):
+        clouds.read(pcd(tmp_path / "b.pcd", XYZ, points=10**9))
+    with pytest.raises(InputError, match="pcl_convert_pcd_ascii_binary"):
+        clouds.read(pcd(tmp_path / "c.pcd", XYZ, "binary_compressed"))
+    (tmp_path / "d.pcd").write_text("VERSION 0.7\n")
+    with pytest.raises(InputError, match="no header of a PCD file"):
+        clouds.read(tmp_path / "d.pcd")

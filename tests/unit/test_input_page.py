@@ -44,6 +44,19 @@ TABLES = {
     "500,100,2023-08-10T10:00:00Z,2023-08-10T09:30:00Z,PT30M\n",
     "Open-Meteo": "latitude,longitude,elevation,utc_offset_seconds,timezone\n48,8,1,0,GMT\n\n"
     "time,shortwave_radiation (W/m²)\n2023-08-10T10:00,500\n2023-08-10T11:00,510\n",
+    "KNMI hourly": "# BRON: KNMI\n# Q : Globale straling (in J/cm2) per uurvak\n#\n"
+    "# STN,YYYYMMDD,   HH,    T,    Q\n#\n  260,20230810,   10,  180,  180\n"
+    "  260,20230810,   24,  190,     \n",
+    "SURFRAD": " Boulder\n  40.125 -105.237 1689 m version 1\n"
+    + "".join(
+        f" 2023 222  8 10 10 {minute:2d} 10.000  45.00  {power}.0 {flag}  120.0 0  700.0 0  100.0 0"
+        + " -9999.9 0" * 16
+        + "\n"
+        for minute, power, flag in ((0, 500, 0), (1, 999, 1))
+    ),
+    "MIDC of NREL": "DATE (MM/DD/YYYY),MST,Global Horizontal [W/m^2],Direct Normal [W/m^2],"
+    "Diffuse Horizontal [W/m^2]\n08/10/2023,03:00,500.0,700.0,100.0\n"
+    "08/10/2023,03:01,501.0,700.0,100.0\n",
     "CSV of a spreadsheet, day and clock apart": "Datum;Uhrzeit;Globalstrahlung [W/m²]\n"
     "10.08.2023;12:00;500,0\n10.08.2023;12:10;1.001,5\n",
 }

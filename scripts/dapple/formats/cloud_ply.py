@@ -29,7 +29,7 @@ def read(path: Path) -> RawCloud:
     """Read the vertices; faces and other elements are left alone, rays that met nothing as well."""
     values, header = _vertices(path)
     xyz = _axes(values, "xyz")
-    _check_precision(path, xyz, {name: values[name].dtype.str[1:] for name in "xyz"})
+    check_precision(path, xyz, {name: values[name].dtype.str[1:] for name in "xyz"})
     left_out, met = {}, None
     others = [name for name in values if name not in "xyz"]
     if _is_ray_cloud(values):
@@ -119,7 +119,7 @@ def write(path: Path, raw: RawCloud) -> None:
         table.tofile(handle)
 
 
-def _check_precision(path: Path, xyz: np.ndarray, kinds: dict[str, str]) -> None:
+def check_precision(path: Path, xyz: np.ndarray, kinds: dict[str, str]) -> None:
     """Refuse large coordinates in float32: their millimetres are gone already."""
     for axis, name in enumerate("xyz"):
         largest = np.nanmax(np.abs(xyz[:, axis]), initial=0.0)

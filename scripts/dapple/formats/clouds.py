@@ -8,7 +8,7 @@ import numpy as np
 
 from dapple import frames
 from dapple.errors import EmptyCloudError, InputError
-from dapple.formats import cloud_e57, cloud_las, cloud_ply, cloud_ptx, cloud_text
+from dapple.formats import cloud_e57, cloud_las, cloud_pcd, cloud_ply, cloud_ptx, cloud_text
 from dapple.formats.cloud_raw import Fired, RawCloud, Source
 from dapple.formats.ordered_scan import OrderedScan
 
@@ -20,6 +20,7 @@ READERS = {
     ".ply": cloud_ply.read,
     ".e57": cloud_e57.read,
     ".ptx": cloud_ptx.read,
+    ".pcd": cloud_pcd.read,
     **dict.fromkeys((".txt", ".xyz", ".csv", ".asc", ".pts"), cloud_text.read),
 }
 SIGNATURES: dict[bytes, tuple[str, tuple[str, ...]]] = {
@@ -87,8 +88,9 @@ def read_with_source(path: str | Path) -> tuple[Cloud, Source]:
     Parameters
     ----------
     path : str or Path
-        LAS, LAZ, PLY (ASCII or binary; CloudCompare's `scalar_` prefix is dropped), E57 and PTX
-        (all scans, posed; `PointSourceId` counts them from 1), or text with or without a header.
+        LAS, LAZ, PLY (ASCII or binary; CloudCompare's `scalar_` prefix is dropped), PCD, E57 and
+        PTX (all scans, posed; `PointSourceId` counts them from 1), or text with or without a
+        header.
 
     Returns
     -------

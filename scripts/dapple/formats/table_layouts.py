@@ -2,7 +2,7 @@
 
 Campbell TOA5 and TOACI1, Onset HOBO, DWD's ten-minute and hourly radiation, BSRN (PANGAEA's text
 and the station-to-archive file), NSRDB, PVGIS (hourly, typical year), FLUXNET, CAMS, Solcast,
-Open-Meteo.
+Open-Meteo; and those of `station_layouts`.
 """
 
 import re
@@ -16,10 +16,8 @@ import pandas as pd
 
 from dapple.errors import InputError
 from dapple.formats import table_numbers
-from dapple.formats.text_table import Table, build
-
-JOINED_TIME = "time"
-"""Column that is made of a layout's columns of year, month, day, hour and minute."""
+from dapple.formats.station_layouts import knmi, midc, surfrad
+from dapple.formats.text_table import JOINED_TIME, Table, build, there
 
 
 def recognise(path: Path, lines: Sequence[str]) -> Table | None:
@@ -47,7 +45,7 @@ def _toa5(path: Path, lines: Sequence[str]) -> Table | None:
     table = build(path, lines, header=1, delimiter=",", first=4, layout="TOA5")
     units = [cell.strip().strip('"') for cell in lines[2].split(",")]
     named = {n: u for n, u in zip(table.cells.columns, units, strict=False) if u}
-    return replace(table, units=named, known=_there(table, time="TIMESTAMP"))
+    return replace(table, units=named, known=there(table, time="TIMESTAMP"))
 
 
 def _hobo(path: Path, lines: Sequence[str]) -> Table | None:
@@ -89,9 +87,9 @@ def _dwd(path: Path, lines: Sequence[str]) -> Table | None:
                 timezone="+01:00" if old else "UTC",
                 interval_label="end",
                 interval_min=interval_min,
-                known=_there(table, time="MESS_DATUM", **wanted),
+                known=there(table, time="MESS_DATUM", **wanted),
             )
-    return replace(table, known=_there(table, time="MESS_DATUM"))
+    return replace(table, known=there(table, time="MESS_DATUM"))
 
 
 def _pangaea(path: Path, lines: Sequence[str]) -> Table | None:
@@ -156,7 +154,7 @@ def _nsrdb(path: Path, lines: Sequence[str]) -> Table | None:
         units={"GHI": "W/m2", "DHI": "W/m2"},
         timezone=_offset(hours),
         interval_min=0.0,
-        known=_there(table, **{"global": "GHI", "diffuse": "DHI"}) | {"time": JOINED_TIME},
+        known=there(table, **{"global": "GHI", "diffuse": "DHI"}) | {"time": JOINED_TIME},
     )
 
 
@@ -186,7 +184,7 @@ def _pvgis(path: Path, lines: Sequence[str]) -> Table | None:
             "Download it again.",
         )  # fmt: skip
     if "G(h)" in table.cells:
-        known = _there(table, **{"global": "G(h)", "diffuse": "Gd(h)"})
+        known = there(table, **{"global": "G(h)", "diffuse": "Gd(h)"})
         return replace(table, units=dict.fromkeys(known.values(), "W/m2"),
                        known=known | {"time": time}, **facts)  # fmt: skip
     slope = re.search(r"Slope:\s*(-?[\d.]+)", "\n".join(lines[:header]))
@@ -245,7 +243,7 @@ def _cams(path: Path, lines: Sequence[str]) -> Table | None:
     if len(period.columns) != 2 or period.isna().any(axis=None):
         raise InputError(path, "rows without a period", "CAMS's CSV", "Download it again.")
     cells = table.cells.assign(**{JOINED_TIME: period[0]})
-    known = _there(table, **{"global": "GHI", "diffuse": "DHI"})
+    known = there(table, **{"global": "GHI", "diffuse": "DHI"})
     return replace(
         table,
         cells=cells,
@@ -309,11 +307,6 @@ def _open_meteo(path: Path, lines: Sequence[str]) -> Table | None:
     )
 
 
-def _there(table: Table, **columns: str) -> dict[str, str]:
-    """Those of a layout's columns that a file has."""
-    return {role: name for role, name in columns.items() if name in table.cells}
-
-
 LAYOUTS: tuple[Callable[[Path, Sequence[str]], Table | None], ...] = (
     _toa5,
     _hobo,
@@ -326,4 +319,7 @@ LAYOUTS: tuple[Callable[[Path, Sequence[str]], Table | None], ...] = (
     _cams,
     _solcast,
     _open_meteo,
+    knmi,
+    surfrad,
+    midc,
 )

@@ -14,6 +14,8 @@ from dapple.formats import column_names, table_numbers
 from dapple.formats.column_names import UNIT_IN_HEADER
 from dapple.formats.table_numbers import Numbers
 
+JOINED_TIME = "time"
+"""Column that is made of a layout's columns of year, month, day, hour and minute."""
 MOST_NAMED = 4
 """Of many usual names, messages list so many."""
 
@@ -176,6 +178,11 @@ def build(
     cells = pd.DataFrame(rows, columns=names, index=pd.Index(numbers, dtype=int), dtype=str)
     units = in_header | dict(facts.pop("units", {}))  # type: ignore[call-overload]
     return Table(path, cells, units=units, repeated=repeated, **facts)  # type: ignore[arg-type]
+
+
+def there(table: Table, **columns: str) -> dict[str, str]:
+    """Those of a layout's columns, by role, that a file has."""
+    return {role: name for role, name in columns.items() if name in table.cells}
 
 
 def cells_of(line: str, delimiter: str) -> list[str]:
