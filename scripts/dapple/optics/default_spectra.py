@@ -15,10 +15,16 @@ LEAF = {
 """Arguments of PROSPECT for a healthy, mature apple leaf. Assumed, not measured on any tree; in the
 PAR band only chlorophyll matters much."""
 
-BARK = {"wavelength_nm": (400.0, 550.0, 700.0), "reflectance": (0.10, 0.18, 0.26)}
-"""Assumed, not measured: between measured branches of birch and larch (0.07 to 0.18, spectral
-database of LESS, Qi et al. 2019) and the bark colour of the published apple tree (red 0.37, green
-0.36, blue 0.33; Frey et al. 2025)."""
+BARK = {
+    "wavelength_nm": tuple(400.0 + 25.0 * k for k in range(13)),
+    "reflectance": (
+        *(0.089, 0.091, 0.094, 0.097, 0.101, 0.107, 0.112),
+        *(0.117, 0.123, 0.128, 0.131, 0.133, 0.178),
+    ),
+}
+"""Mean of the measured reflectance of branches of birch and larch (spectral database of LESS, Qi et
+al. 2019). The bark colour that comes with the published apple tree is brighter: red 0.37, green
+0.36, blue 0.33 (Frey et al. 2025)."""
 
 MEADOW = {
     "wavelength_nm": (400.0, 500.0, 550.0, 600.0, 680.0, 700.0),
