@@ -23,7 +23,7 @@ import crown
 from dapple import steps
 from dapple.light.light_model import Model, Tracing
 from dapple.scene import traced
-from dapple.sky.open_sky import level_beam, open_sky_par
+from dapple.sky.open_sky import open_beam, open_sky_par
 from dapple.sky.solar_disc import SUN_DIAMETER_DEG
 
 MODEL = Model(sky_patches=577, max_orders=30)
@@ -39,7 +39,7 @@ def repeated(kind: str, n_seeds: int) -> pd.DataFrame:
     scene, sensors_m = traced.load(crown.scene(kind, 60_000), "llvm_ad_mono"), crown.sensors(25)
     sky, optics = crown.sky(12), crown.optics()
     open_sky = open_sky_par(sky).to_numpy()
-    beam = level_beam(sky) / open_sky
+    beam = open_beam(sky) / open_sky
     light = {part: [] for part in ("direct", "sky and scattered", "all")}
     error = {part: [] for part in light}
     for seed in range(n_seeds):

@@ -32,7 +32,7 @@ from dapple.light.light_model import Model, Tracing
 from dapple.light.timestep_series import Reference
 from dapple.scene import scene_files, scene_optics, traced
 from dapple.scene.surfaces import LEAF, WOOD, Scene
-from dapple.sky.open_sky import level_beam, open_sky_par
+from dapple.sky.open_sky import open_beam, open_sky_par
 from dapple.sky.solar_disc import SUN_DIAMETER_DEG
 
 TIMED = ("load", "direct", "paths", "bands_and_write")
@@ -99,7 +99,7 @@ def once(folder: Path, variant: str, tolerance: float) -> dict[str, float]:
     open_sky = open_sky_par(sky).to_numpy()
     share = result.standard_error / open_sky
     # As the reference engine does it: from replicates alone, nought where all rays agree.
-    beam = level_beam(sky) / open_sky
+    beam = open_beam(sky) / open_sky
     own = sunlit.share.std(axis=0, ddof=1) / np.sqrt(len(sunlit.share))
     plain = share**2 + (own**2 - sunlit.standard_error**2) * beam**2
     return dict(zip(TIMED, np.diff(clock), strict=True)) | {

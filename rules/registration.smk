@@ -20,6 +20,7 @@ if settings.registration.fit:
             ),
             sky_table=sky_table(),
             frame=OWN_FRAME,
+            ground=GROUND,
             code=code("registration"),
         output:
             registration=results("registration/registration.json"),
@@ -40,6 +41,7 @@ if settings.registration.fit:
             sun_diameter_deg=settings.light.sun_diameter_deg,
             aperture_m=settings.light.entrance_m,
             response=RESPONSE,
+            ground_z_m=GROUND_Z_M,
             variant=f"{VARIANT}_rgb",
             seed=stream("registration"),
         message:

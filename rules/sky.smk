@@ -94,6 +94,7 @@ rule sensors:
         kind=settings.sensors.kind,
         table=settings.sensors.table(),
         grid=settings.sensors.grid(),
+        facing=settings.sensors.facing(),
         origin_m=(
             settings.registration.origin_m
             if settings.sensors.kind == "table"

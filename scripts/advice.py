@@ -9,7 +9,7 @@ from dapple.clock import label
 from dapple.formats import json, netcdf, tables
 from dapple.formats.atomic import atomic
 from dapple.light.light_model import Model, Tracing
-from dapple.scene import scene_files, scene_optics, traced
+from dapple.scene import scene_files, scene_optics, sensors, traced
 from dapple.workflow import run
 
 HEAD = """\
@@ -30,12 +30,13 @@ def main(snakemake):
     chosen = pilot.spread(len(table), params.sensors)
     moments = pilot.daylight_times(sky, params.times)
     one = pilot.Pilot(
-        table[["x_m", "y_m", "z_m"]].to_numpy()[chosen],
+        table[sensors.POSITION].to_numpy()[chosen],
         sky.isel(time=moments),
         optics,
         finest=Model(max_orders=params.max_orders, bands=len(optics)),
         tracing=Tracing(**params.tracing),
         repeats=params.repeats,
+        facing=sensors.facing_of(table.iloc[chosen]),
         seed=params.seed,
     )
     base = scene_files.read([inputs.leaves], inputs.wood, around)[0]

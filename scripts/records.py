@@ -5,6 +5,7 @@ import pandas as pd
 
 from dapple import findings
 from dapple.formats import json, netcdf, tables
+from dapple.scene.sensors import facing_of
 from dapple.sky.open_sky import open_sky_par
 from dapple.stats import measured, plausible_records
 from dapple.stats.measured import Records
@@ -16,13 +17,16 @@ from dapple.workflow import run
 def main(snakemake):
     params, inputs = snakemake.params, snakemake.input
     registration = json.read(inputs.registration) if inputs.registration else {}
+    places = tables.read(inputs.sensors)
     if params.kind == "virtual":
         truth = netcdf.read(inputs.truth)
         records = Records(simulate(truth, **params.sensor_model, seed=params.seed))
     else:
-        places = tables.read(inputs.sensors)
         records = measured.read(inputs.measured, sensors=places, **params.table)
-    sky = open_sky_par(netcdf.read(inputs.sky), params.response)
+    facing = facing_of(places)
+    sky = open_sky_par(netcdf.read(inputs.sky), params.response, facing)
+    if facing is not None:
+        sky = sky.assign_coords(sensor=list(places["sensor"]))
     table = pd.concat(
         [
             pair(

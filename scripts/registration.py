@@ -26,6 +26,9 @@ def main(snakemake):
         return sky_dataset(times, site, radiation.values, *measured, **params.atmosphere)
 
     table = sensors.read(inputs.sensors, known, **params.sensors)
+    if params.sensors["heights"] == "above_ground":
+        ground = scene_files.around(inputs.ground or params.ground_z_m).ground
+        table = sensors.on_ground(table, ground)
     found = shading.register(
         scene_files.read(inputs.leaves, inputs.wood),
         table,

@@ -12,11 +12,14 @@ def main(snakemake):
     if params.kind == "table":
         known = json.read(inputs.frame)["origin_m"] if inputs.frame else params.origin_m
         table = sensors.read(inputs.table, known or (0.0, 0.0, 0.0), **params.table)
-        if inputs.ground:
+        if params.table["heights"] == "above_ground":
+            table = sensors.on_ground(table, ground)
+        elif inputs.ground:
             table = sensors.lifted(table, ground)
     else:
         stem_m = stem_position(meshes.read_ply(inputs.wood))
         table = sensors.grid_around(stem_m, **params.grid, ground=ground)
+        table = sensors.turned(table, **params.facing)
     sensors.check(table, ground=ground, where=str(inputs.table or "sensors"))
     tables.write(snakemake.output.sensors, table, None)
 

@@ -7,7 +7,7 @@ import pandas as pd
 from dapple import engine
 from dapple.formats import netcdf, tables
 from dapple.light.moved_sensors import moved_light
-from dapple.scene import scene_files, traced
+from dapple.scene import scene_files, sensors, traced
 from dapple.stability import worse_records
 from dapple.stats.pairs import simulated
 from dapple.workflow import run
@@ -26,7 +26,8 @@ def main(snakemake):
     labels = records["sensor"].unique()
     light = {Path(path).stem: netcdf.read(path).sel(sensor=labels) for path in inputs.light}
     sky, table = netcdf.read(inputs.sky), tables.read(inputs.sensors).set_index("sensor")
-    sensors_m = table.loc[labels, ["x_m", "y_m", "z_m"]].to_numpy()
+    table = table.loc[labels]
+    sensors_m, facing = table[sensors.POSITION].to_numpy(), sensors.facing_of(table)
     scenes = {name: loaded(name, inputs, params) for name in params.reconstructions}
 
     def moved(error_m, seed):
@@ -37,6 +38,7 @@ def main(snakemake):
             "sun_diameter_deg": params.sun_diameter_deg,
             "aperture_m": params.aperture_m,
             "response": params.response,
+            "facing": facing,
             "max_rays": MAX_RAYS,
             "tolerance": TOLERANCE,
             "shift_m": error_m,

@@ -23,6 +23,7 @@ def main(snakemake):
         Tracing(**params.tracing),
         # Nominal spectra: the run's own may change without tracing again.
         optics=scene_optics.from_spectra(),
+        facing=sensors.facing_of(table),
         seed=params.seed,
     )
     started = counted.n_paths * counted.n_replicates

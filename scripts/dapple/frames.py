@@ -34,6 +34,20 @@ def direction_from_angles(zenith_deg: ArrayLike, azimuth_deg: ArrayLike) -> np.n
     )
 
 
+def across(normal: np.ndarray) -> np.ndarray:
+    """Two unit vectors (..., 2, 3) at right angles to unit vectors (..., 3) and to each other.
+
+    Of straight up they are east and north (Duff et al. 2017, JCGT 6(1), 1-8).
+    """
+    x, y, z = np.moveaxis(np.asarray(normal, float), -1, 0)
+    sign = np.copysign(1.0, z)
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    first = np.stack([1.0 + sign * x * x * a, sign * b, -sign * x], axis=-1)
+    second = np.stack([b, sign + y * y * a, -y], axis=-1)
+    return np.stack([first, second], axis=-2)
+
+
 def angles_from_direction(direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Zenith (0 to 180) and azimuth (0 to 360, clockwise from north) of vectors [°].
 

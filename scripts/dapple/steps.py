@@ -170,6 +170,7 @@ def sun(
     model: Model,
     tracing: Tracing,
     *,
+    facing: np.ndarray | None = None,
     seed: int,
 ) -> Sunlit:
     """What sensors see of the sun at the times of a sky, traced as often as a model wants.
@@ -184,6 +185,8 @@ def sun(
     model : Model
         Sun and time step count.
     tracing : Tracing
+    facing : (n, 3) float64 or None
+        Unit normals of the sensors; None: they are level.
     seed : int
     """
     minutes = (times(sky) - times(sky)[0]).total_seconds().to_numpy() / 60
@@ -196,6 +199,7 @@ def sun(
         max_rays=tracing.max_shadow_rays,
         sun_diameter_deg=0.0 if model.sun == "point" else tracing.sun_diameter_deg,
         aperture_m=tracing.aperture_m,
+        facing=facing,
         seed=seed,
     )
     return interpolated(seen, minutes[chosen], minutes) if len(chosen) < len(minutes) else seen
@@ -208,6 +212,7 @@ def paths(
     tracing: Tracing,
     *,
     optics: Optics | None = None,
+    facing: np.ndarray | None = None,
     seed: int,
 ) -> Transport:
     """Rays to the sky and paths back from the sensors, counted for any sky, spectrum and time.
@@ -223,6 +228,8 @@ def paths(
     optics : Optics or None
         Nominal spectra by which errors are judged; where they are given and `tracing` allows it,
         rays are added until errors are small.
+    facing : (n, 3) float64 or None
+        Unit normals of the sensors; None: they are level.
     seed : int
     """
     growth = None
@@ -240,6 +247,7 @@ def paths(
         growth=growth,
         aperture_m=tracing.aperture_m,
         response=tracing.response,
+        facing=facing,
         seed=seed,
     )
 
@@ -251,6 +259,7 @@ def products(
     optics: Optics,
     model: Model,
     tracing: Tracing,
+    facing: np.ndarray | None = None,
 ) -> Light:
     """Light under a sky from what was traced of the sun and of paths.
 
@@ -268,6 +277,10 @@ def products(
         Sky, ground and bands count.
     tracing : Tracing
         For the kernel of the sun.
+    facing : (n, 3) float64 or None
+        As in `paths`.
     """
     kept = simplified(sky, optics, model)
-    return series.compute(sunlit, counted, *kept, sun_kernel_deg=tracing.sun_kernel_deg)
+    return series.compute(
+        sunlit, counted, *kept, sun_kernel_deg=tracing.sun_kernel_deg, facing=facing
+    )

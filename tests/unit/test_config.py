@@ -179,6 +179,13 @@ CONTRADICTIONS = {
         ({"optics": {"bark": {"wavelength_nm": [400.0, 500.0, 700.0]}}}, "3 wavelengths"),
     ],
     "light": [({"light": {"engine": "timestep", "model": "advised"}}, "light.model: advised")],
+    "sensors": [
+        ({"sensors": {"tilt_deg": 30}}, "no `sensors.azimuth_deg`"),
+        (
+            {"study": "stability", "sensors": {"tilt_deg": 30, "azimuth_deg": 180}},
+            "`sensors.tilt_deg: 30`",
+        ),
+    ],
     "voxels": [
         (
             {"voxels": {"estimator": "contact_frequency", "contact_voxel_m": 0}},

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from dapple.errors import InputError
-from dapple.formats.ground_surface import flat
+from dapple.formats.ground_surface import GroundSurface, flat
 from dapple.formats.meshes import Mesh
 from dapple.scene import sensors
 from dapple.scene.surfaces import of_kinds
@@ -54,11 +54,50 @@ def test_a_plain_table_is_read_as_well_and_labels_stay_text(tmp_path):
         ("label,X,Y,Z\n,1,2,3\n", "without a label"),
         ("label,X,Y\n1_1,1,2\n", "a column z_m or z"),
         ("label,X,Y,Z\n", "no sensors"),
+        ("label,X,Y,Z,tilt_deg\n1_1,1,2,3,30\n", "azimuth_deg nan of sensor 1_1"),
+        ("label,X,Y,Z,tilt,azimuth\n1_1,1,2,3,200,0\n", "tilt_deg 200 of sensor 1_1"),
+        ("label,X,Y,Z,tilt,azimuth\n1_1,1,2,3,20,-90\n", "azimuth_deg -90 of sensor 1_1"),
+        ("label,X,Y,Z,calibration\n1_1,1,2,3,0\n", "calibration 0 of sensor 1_1"),
     ],
 )
 def test_a_broken_table_is_refused(tmp_path, text, message):
     with pytest.raises(InputError, match=message):
         sensors.read(table(tmp_path, text))
+
+
+def test_a_row_that_stands_there_twice_is_read_once_with_a_word(tmp_path, capsys):
+    read = sensors.read(table(tmp_path, "label,X,Y,Z\na,1,2,3\nb,1,2,4\na,1,2,3\n"))
+    assert list(read["sensor"]) == ["a", "b"]
+    assert "1 rows twice, read once" in capsys.readouterr().out
+
+
+def test_tilted_sensors_face_where_their_columns_say_and_level_ones_need_no_azimuth(tmp_path):
+    text = "label,X,Y,Z,tilt_deg,azimuth_deg\na,1,2,3,0,\nb,1,2,3,90,90\nc,1,2,3,30,180\n"
+    found = sensors.facing_of(sensors.read(table(tmp_path, text)))
+    half = 0.5, np.sqrt(0.75)
+    expected = np.array([[0, 0, 1], [1, 0, 0], [0, -half[0], half[1]]])
+    assert found == pytest.approx(expected, abs=1e-12)
+
+
+def test_level_sensors_carry_no_angles(tmp_path):
+    read = sensors.read(table(tmp_path, "label,X,Y,Z,tilt_deg\na,1,2,3,0\n"))
+    assert list(read) == ["sensor", *sensors.POSITION]
+    assert sensors.facing_of(read) is None
+
+
+def test_angles_of_the_configuration_hold_where_the_table_has_none(tmp_path):
+    path = table(tmp_path, "label,X,Y,Z,tilt\na,1,2,3,20\n")
+    read = sensors.read(path, tilt_deg=45.0, azimuth_deg=270.0)
+    assert read[["tilt_deg", "azimuth_deg"]].to_numpy().tolist() == [[20.0, 270.0]]
+
+
+def test_heights_above_the_ground_follow_a_slope_and_leave_the_height_of_the_origin_alone(tmp_path):
+    path = table(tmp_path, "label,X,Y,Z\na,500010,20,0.5\nb,500000,20,0.5\n")
+    read = sensors.read(path, (500000.0, 0.0, 300.0), heights="above_ground")
+    slope = GroundSurface(
+        np.array([0.0, 20.0]), np.array([0.0, 40.0]), np.array([[0.0, 2.0], [0.0, 2.0]])
+    )
+    assert sensors.on_ground(read, slope)["z_m"].to_numpy() == pytest.approx([1.5, 0.5])
 
 
 def test_a_missing_table_is_refused(tmp_path):

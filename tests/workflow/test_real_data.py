@@ -2,9 +2,15 @@
 
 import json
 
+import laspy
 import numpy as np
 import pytest
+import rasterio
 import xarray as xr
+import yaml
+from rasterio.enums import ColorInterp
+from rasterio.transform import from_origin
+from scipy import ndimage
 from tests.workflow.project import ROOT, copy_of_project
 
 DATA = (ROOT / "../shared/data").resolve()
@@ -115,3 +121,66 @@ def test_the_published_tree_can_be_planned_from_its_own_records(tmp_path):
     assert {"real_wood", "virtual_leaves", "registration", "voxels", "light"} <= planned
     assert {"record_statistics", "page"} <= planned
     assert not {"plant", "ingest"} & planned
+
+
+def images_over(lidar, path, pixel_m=0.25):
+    """Five bands and alpha above a cloud: bright crowns, dark soil, shade to the north."""
+    cloud = laspy.read(lidar)
+    low, high = (np.array(corner)[:2] for corner in (cloud.header.mins, cloud.header.maxs))
+    columns, rows = np.ceil((high - low) / pixel_m).astype(int)
+    column, row = (np.column_stack([cloud.x - low[0], high[1] - cloud.y]) / pixel_m).astype(int).T
+    top = np.full((rows, columns), cloud.header.mins[2])
+    np.maximum.at(top, (row.clip(0, rows - 1), column.clip(0, columns - 1)), cloud.z)
+    height = top - ndimage.minimum_filter(top, 41)
+    shaded = height < np.roll(height, -6, axis=0) - 3.0  # the sun stands in the south
+    noise = np.random.default_rng(1).lognormal(0.0, 0.1, height.shape)
+    crown = {"Blue": 0.02, "Green": 0.06, "Red": 0.03, "Red edge": 0.16, "NIR": 0.32}
+    soil = {"Blue": 0.06, "Green": 0.10, "Red": 0.14, "Red edge": 0.18, "NIR": 0.24}
+    light = noise * np.where(shaded, 0.3, 1.0)
+    bands = [np.where(height > 2.0, crown[name], soil[name]) * light for name in crown]
+    values = np.stack([*(1e4 * band for band in bands), np.full(height.shape, 65_535)])
+    with rasterio.open(
+        path, "w", dtype="uint16", crs="EPSG:26912", count=6, width=columns, height=rows,
+        transform=from_origin(low[0], high[1], pixel_m, pixel_m),
+    ) as file:  # fmt: skip
+        file.write(values.clip(0, 65_535).astype(np.uint16))
+        file.descriptions = [*crown, ""]
+        file.colorinterp = [ColorInterp.gray] * 5 + [ColorInterp.alpha]
+
+
+@pytest.fixture(scope="session")
+def real_flight(tmp_path_factory):
+    """A real UAV LiDAR cloud of ponderosa pines with images made for it; no crowns are known."""
+    if not (lidar := DATA / "airborne/UAS_Clip.laz").is_file():
+        pytest.skip(f"no real data: {lidar} is absent")
+    folder = tmp_path_factory.mktemp("flight")
+    images_over(lidar, folder / "mosaic.tif")
+    (folder / "flight.laz").symlink_to(lidar)
+    chosen = {
+        "plots": ["user"],
+        "user": {"lidar": "flight.laz", "images": "mosaic.tif", "scale": 10_000,
+                 "time": "2023-06-21 12:00", "timezone": "America/Phoenix"},
+        "images": {"least_paths": 100_000, "paths_per_pixel": 16},
+        "retrieval": {"models": ["collision_orders"], "masks": ["all"], "networks": ["robust"],
+                      "combinations": 40, "seeds": [1], "max_epochs": 5},
+    }  # fmt: skip
+    settings = {"experiment": "flight", "study": "chlorophyll", "data_dir": str(folder)}
+    (folder / "flight.yaml").write_text(yaml.safe_dump(settings | {"chlorophyll": chosen}))
+    project = copy_of_project(folder / "dapple", folder / "flight.yaml", experiment="flight")
+    wanted = ("chlorophyll/user_report.html", "chlorophyll/map.tif")
+    project.run(*(project.result(path).relative_to(project.folder) for path in wanted))
+    return project
+
+
+def test_a_real_flight_gets_a_map_with_intervals_in_its_own_system_and_a_page(real_flight):
+    with rasterio.open(real_flight.result("chlorophyll/map.tif")) as found:
+        names, values = list(found.descriptions), found.read(masked=True)
+        assert found.crs.is_projected
+        assert found.bounds.left == pytest.approx(470_627, abs=5)
+        assert found.bounds.top == pytest.approx(3_810_248, abs=5)
+    assert len(names) >= 3
+    chlorophyll = values[0].compressed()
+    assert len(chlorophyll) > 10
+    assert 1.0 < chlorophyll.min() <= chlorophyll.max() < 150.0
+    page = real_flight.result("chlorophyll/user_report.html").read_text()
+    assert "No measured tree" in page

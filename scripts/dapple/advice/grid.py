@@ -19,6 +19,7 @@ from dapple.light.timestep_series import Reference
 from dapple.light.tolerances import DIRECT_SHARE
 from dapple.scene import traced
 from dapple.scene.scene_optics import Optics
+from dapple.scene.sensors import POSITION, facing_of
 from dapple.scene.surfaces import Scene
 from dapple.scene.traced import TracedScene
 from dapple.sky.open_sky import open_sky_par
@@ -131,11 +132,12 @@ class Grid:
         )
         light, costs = light_and_costs(
             scene,
-            self.sensors[["x_m", "y_m", "z_m"]].to_numpy(),
+            self.sensors[POSITION].to_numpy(),
             self.sky,
             self.optics,
             model,
             tracing,
+            facing=facing_of(self.sensors),
             seed=self.seed + paths,
         )
         return light.par, sum(costs.values(), Cost())

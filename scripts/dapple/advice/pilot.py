@@ -75,6 +75,7 @@ def light_and_costs(
     model: Model,
     tracing: Tracing,
     *,
+    facing: np.ndarray | None = None,
     seed: int,
 ) -> tuple[Light, dict[str, Cost]]:
     """Light of a scene by the transport engine, and the cost of each of its `PARTS`.
@@ -84,12 +85,18 @@ def light_and_costs(
     Parameters are those of `steps.sun` and `steps.products`.
     """
     sunlit, direct = timed(
-        lambda: steps.sun(scene, sensors_m, sky, model, tracing, seed=stream_seed(seed, "sun"))
+        lambda: steps.sun(
+            scene, sensors_m, sky, model, tracing, facing=facing, seed=stream_seed(seed, "sun")
+        )
     )
     counted, paths = timed(
-        lambda: steps.paths(scene, sensors_m, model, tracing, seed=stream_seed(seed, "paths"))
+        lambda: steps.paths(
+            scene, sensors_m, model, tracing, facing=facing, seed=stream_seed(seed, "paths")
+        )
     )
-    light, products = timed(lambda: steps.products(sunlit, counted, sky, optics, model, tracing))
+    light, products = timed(
+        lambda: steps.products(sunlit, counted, sky, optics, model, tracing, facing)
+    )
     sizes = {"n_times": sky.sizes["time"], "n_bands": model.bands}
     counted_work = (
         direct.of(costs.work_of_sun(sunlit)),
@@ -114,6 +121,8 @@ class Pilot:
     tracing : Tracing
     repeats : int
         The shortest of so many runs is what a model costs: others share the machine.
+    facing : (n, 3) float64 or None
+        Unit normals of the sensors; None: they are level.
     seed : int
     """
 
@@ -126,8 +135,10 @@ class Pilot:
         finest: Model,
         tracing: Tracing,
         repeats: int,
+        facing: np.ndarray | None = None,
         seed: int,
     ):
+        self.facing = facing
         self.sensors_m, self.sky, self.optics = sensors_m, sky, optics
         self.finest, self.tracing = finest, tracing
         self.repeats, self.seed = repeats, seed
@@ -137,7 +148,14 @@ class Pilot:
         """Light of a model and its cost with kernels that are compiled already."""
         runs = [
             light_and_costs(
-                scene, self.sensors_m, self.sky, self.optics, model, self.tracing, seed=self.seed
+                scene,
+                self.sensors_m,
+                self.sky,
+                self.optics,
+                model,
+                self.tracing,
+                facing=self.facing,
+                seed=self.seed,
             )
             # One more than asked for: the first may compile kernels.
             for _ in range(self.repeats + 1)

@@ -17,7 +17,7 @@ from dapple.light.series import Light
 from dapple.light.visibility import Sunlit
 from dapple.optics.responses import Response
 from dapple.scene.traced import TracedScene
-from dapple.sky.open_sky import level_diffuse, open_sky_par
+from dapple.sky.open_sky import open_diffuse, open_sky_par
 from dapple.sky.sun import position
 
 LEVELS = {
@@ -145,7 +145,9 @@ def step_effects(
         """The sun at some of the minutes, each of them traced."""
         every = replace(pilot.finest, step_min=0.0)
         there = suns.isel(time=known)
-        return steps.sun(scene, pilot.sensors_m, there, every, pilot.tracing, seed=seed)
+        return steps.sun(
+            scene, pilot.sensors_m, there, every, pilot.tracing, facing=pilot.facing, seed=seed
+        )
 
     minutes = np.arange(window + 1)
     seen = visible(minutes).share.mean(axis=0)
@@ -167,7 +169,7 @@ def _share_of_beam(
 ) -> np.ndarray:
     """Direct light as a share of what sensors read under the open sky."""
     total = open_sky_par(sky, response).to_numpy()
-    diffuse = level_diffuse(sky, response)
+    diffuse = open_diffuse(sky, response)
     share = np.where(total > 0, 1 - diffuse / np.where(total > 0, total, 1), 0)
     return np.interp(wanted.as_unit("ns").asi8, stamps.as_unit("ns").asi8, share)
 

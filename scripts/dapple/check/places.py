@@ -17,7 +17,7 @@ REACH_M = 30.0
 
 
 def judge_sensors(
-    facts: CloudFacts, path: str | Path, origin_m: np.ndarray | None, columns: dict[str, str]
+    facts: CloudFacts, path: str | Path, origin_m: np.ndarray | None, columns: dict[str, Any]
 ) -> tuple[dict[str, Any], list[Finding]]:
     """Numbers of a sensor table, and what is wrong with it beside the cloud.
 
@@ -37,6 +37,8 @@ def judge_sensors(
         table = sensors.read(path, origin.tolist(), **columns)
     except InputError as mistake:
         return {}, [findings.of(mistake)]
+    if columns.get("heights") == "above_ground":
+        table = sensors.on_ground(table, facts.ground)
     places = table[sensors.POSITION].to_numpy(float)
     low, high = facts.cloud.xyz_m.min(axis=0), facts.cloud.xyz_m.max(axis=0)
     outside = np.linalg.norm(np.maximum(np.maximum(low - places, places - high), 0.0), axis=1)

@@ -216,6 +216,26 @@ def light(settings: Settings, where: str) -> None:
         )
 
 
+def sensors(settings: Settings, where: str) -> None:
+    """A tilt says to where; the stability map has sensors of its own, which are level."""
+    if not settings.sensors.tilt_deg:
+        return
+    if settings.sensors.kind == "grid" and settings.sensors.azimuth_deg is None:
+        raise InputError(
+            where,
+            f"`sensors.tilt_deg: {settings.sensors.tilt_deg:g}` and no `sensors.azimuth_deg`",
+            "to where the sensors lean, clockwise from north",
+            "Set sensors.azimuth_deg, for example to 180 for sensors that face south.",
+        )
+    if settings.study == "stability":
+        raise InputError(
+            where,
+            f"`study: stability` and `sensors.tilt_deg: {settings.sensors.tilt_deg:g}`",
+            "`sensors.tilt_deg: 0`: the stability map has level sensors",
+            "Remove the tilt from this configuration.",
+        )
+
+
 def times(settings: Settings, where: str) -> None:
     """There are times, and zones to read them in."""
     for section in ("site", "time", "radiation", "measured"):
@@ -270,6 +290,7 @@ CHECKS = (
     times,
     spectra,
     light,
+    sensors,
     voxels,
     plant,
     figures,

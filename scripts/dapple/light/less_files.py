@@ -15,10 +15,12 @@ from dapple.errors import InputError
 from dapple.formats import netcdf, tables
 from dapple.formats.meshes import Mesh
 from dapple.scene.scene_optics import Optics
-from dapple.scene.sensors import POSITION
+from dapple.scene.sensors import POSITION, facing_of
 from dapple.scene.surfaces import Scene, turbid_grid
 from dapple.sky.sky_radiance import FLUXES, in_directions
 
+FACING = ["facing_x", "facing_y", "facing_z"]
+"""Unit normals of the sensors in the axes of LESS."""
 RUNNER = Path(__file__).with_name("less_run.py")
 SKY_GRID = (16, 32)
 """Zenith angles and azimuths at which LESS 3.0.0 takes the radiance of a sky."""
@@ -83,7 +85,7 @@ def write(
     sky : xarray.Dataset
         Sun and sky at the times that are to be simulated.
     sensors : DataFrame
-        `sensor`, `x_m`, `y_m`, `z_m` in the local frame.
+        `sensor`, `x_m`, `y_m`, `z_m` in the local frame, perhaps `tilt_deg` and `azimuth_deg`.
     rays : LessRays
     aperture_m : float
         Diameter of the sensors' receiving discs [m].
@@ -96,7 +98,10 @@ def write(
     folder.mkdir(parents=True, exist_ok=True)
     size_m, corner_m = _around(scene)
     seen_m = max(POINT_M, aperture_m)
-    _write_obj(folder / "plate.obj", "plate", _square(2.0 * seen_m))
+    facing = facing_of(sensors)
+    upright = np.tile([0.0, 0.0, 1.0], (len(sensors), 1)) if facing is None else facing
+    places = frames.local_to_less3(sensors[POSITION].to_numpy(np.float64), corner_m)
+    places[:, 2] = np.maximum(places[:, 2], LIFT_M)
     objects = []
     for number, one in enumerate(scene.filled):
         name = f"{one.optics}_{number}"
@@ -121,14 +126,14 @@ def write(
         "objects": objects,
         "voxels": voxels,
         "plate": {"seen_m": seen_m, "camera_m": max(CAMERA_M, seen_m)},
+        "plates": _plates(folder, 2.0 * seen_m, places, upright),
         "rays": asdict(rays),
     }
     (folder / "scene.json").write_text(json.dumps(facts, indent=1))
     _write_spectra(folder / "spectra.csv", optics)
     _write_light(folder, sky, optics.wavelength_nm)
-    places = frames.local_to_less3(sensors[POSITION].to_numpy(np.float64), corner_m)
-    places[:, 2] = np.maximum(places[:, 2], LIFT_M)
-    table = pd.DataFrame(places, columns=POSITION)
+    columns = np.concatenate([places, frames.local_to_less3(upright, np.zeros(3))], axis=1)
+    table = pd.DataFrame(columns, columns=[*POSITION, *FACING])
     table.insert(0, "sensor", sensors["sensor"].to_numpy())
     tables.write(folder / "sensors.csv", table, digits=None)
     shutil.copyfile(RUNNER, folder / RUNNER.name)
@@ -145,10 +150,24 @@ def _around(scene: Scene) -> tuple[float, np.ndarray]:
     return edge, np.array(corner)
 
 
-def _square(width_m: float) -> Mesh:
-    """A level square around the origin that faces up."""
-    half = 0.5 * width_m
-    corners = np.array([[-half, -half, 0], [half, -half, 0], [half, half, 0], [-half, half, 0]])
+def _plates(
+    folder: Path, width_m: float, places: np.ndarray, facing: np.ndarray
+) -> list[dict[str, Any]]:
+    """Write a plate for each way that sensors (n, 3) face, and list where such plates lie."""
+    ways, way = np.unique(facing, axis=0, return_inverse=True)
+    found = []
+    for number, normal in enumerate(ways):
+        name = f"plate_{number}"
+        _write_obj(folder / f"{name}.obj", "plate", _square(width_m, normal))
+        mine = places[way.ravel() == number]
+        found.append({"name": name, "mesh": f"{name}.obj", "places_m": mine.tolist()})
+    return found
+
+
+def _square(width_m: float, normal: np.ndarray) -> Mesh:
+    """A square around the origin with this unit normal."""
+    ends = 0.5 * width_m * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    corners = ends @ frames.across(normal)
     return Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32), np.zeros(2, np.int32))
 
 

@@ -5,13 +5,13 @@ Needs only `pip install less3d==3.0.0` (the release under the MIT licence). The 
 * `scene.json`: objects, their meshes and places, turbid voxels, sensors' plates, numbers of rays;
 * OBJ meshes, in each of them one named group and flat normals (`v -east up north`);
 * `spectra.csv`: reflectance and transmittance of every surface, a row a band;
-* `sensors.csv`: level sensors that look up;
+* `sensors.csv`: sensors, where they lie and unit vectors to where they face;
 * `suns.csv`, `beam.csv`, `diffuse.csv`, `sky.csv`: at each time the sun's place, irradiance in
   every band of a plane that faces the sun and of the level under the open sky, and radiance of the
   sky on 16 zenith angles (0 to 90 deg) times 32 azimuths (clockwise from north).
 
 Places are in LESS' axes: metres, x east, y south, z up, a corner of the scene at the origin. A
-sensor is a small white plate that is looked at from right above; pi times its radiance is its
+sensor is a small white plate that is looked at from right before it; pi times its radiance is its
 irradiance. LESS' sun is parallel light: suns spread over the disc stand for it.
 """
 
@@ -99,9 +99,10 @@ def build(folder: Path, facts: dict[str, Any], optics: dict[str, Any]) -> less.S
             )
             cubes.set_property("cube", leaves)
             scene.add(cubes, positions=one["centres_m"], scales=turbid["edge_m"])
-    plates = less.Object("plates", mesh=str(folder / "plate.obj"))
-    plates.set_property("plate", less.Lambertian(reflectance=1.0))
-    scene.add(plates, positions=table(folder / "sensors.csv", skip=1))
+    for one in facts["plates"]:
+        plates = less.Object(one["name"], mesh=str(folder / one["mesh"]))
+        plates.set_property("plate", less.Lambertian(reflectance=1.0))
+        scene.add(plates, positions=one["places_m"])
     return scene
 
 
@@ -132,14 +133,16 @@ def seen(
     The third is the standard error of their sum; bands share their paths, so their errors add up.
     Each pixel takes `quality` rays; light meets at most so many surfaces (`orders`) on its way.
     """
-    x, y, z = (float(value) for value in place)
     plate = facts["plate"]
+    target, facing = place[:3], place[3:]
+    position = target + plate["camera_m"] * facing
+    north_is_aside = abs(facing[1]) < 0.7
     camera = less.Perspective(
         image_size=PIXELS,
         fov=2.0 * float(np.degrees(np.arctan(0.5 * plate["seen_m"] / plate["camera_m"]))),
-        position=(x, y, z + plate["camera_m"]),
-        target=(x, y, z),
-        up=(0, 1, 0),
+        position=tuple(position.tolist()),
+        target=tuple(target.tolist()),
+        up=(0, 1, 0) if north_is_aside else (1, 0, 0),
     )
     sensor = less.OpticalImager(
         camera,

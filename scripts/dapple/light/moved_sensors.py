@@ -8,7 +8,7 @@ import xarray as xr
 from dapple.light import visibility
 from dapple.optics.responses import COSINE, Response
 from dapple.scene.traced import TracedScene
-from dapple.sky.open_sky import level_beam, towards_sun
+from dapple.sky.open_sky import open_beam, towards_sun
 
 
 def sideways(places_m: np.ndarray, distance_m: float, seed: int) -> np.ndarray:
@@ -38,6 +38,7 @@ def moved_light(
     tolerance: float = TOLERANCE,
     aperture_m: float = 0.0,
     response: Response = COSINE,
+    facing: np.ndarray | None = None,
 ) -> xr.Dataset:
     """Light at sensors that are moved sideways, each in its own direction.
 
@@ -63,6 +64,8 @@ def moved_light(
         As in `visibility.sunlit`.
     response : Response
         Of the sensors.
+    facing : (s, 3) float64 or None
+        Their unit normals; None: they are level.
 
     Returns
     -------
@@ -80,11 +83,13 @@ def moved_light(
             seed=seed + number,
             sun_diameter_deg=sun_diameter_deg,
             aperture_m=aperture_m,
+            facing=None if facing is None else np.tile(facing, (2, 1)),
         ).share.mean(axis=0)
         for number, scene in enumerate(scenes)
     ]
     here, there = np.split(np.mean(shares, axis=0), 2)
-    change = xr.DataArray((there - here) * level_beam(sky, response), dims=("sensor", "time"))
+    beam = open_beam(sky, response, facing)
+    change = xr.DataArray((there - here) * beam, dims=("sensor", "time"))
     moved = light.copy()
     for name in ("par_umol_m2_s", "par_direct_umol_m2_s"):
         moved[name] = (light[name] + change.to_numpy()).clip(min=0)

@@ -57,8 +57,9 @@ def trace(
     halved_after: int | None = None,
     aperture_m: float = 0.0,
     response: Response = COSINE,
+    facing: np.ndarray | None = None,
 ) -> Paths:
-    """Trace paths backward from level sensors that look up.
+    """Trace paths backward from sensors.
 
     Parameters
     ----------
@@ -83,6 +84,8 @@ def trace(
         Diameter of the sensors' receiving discs [m].
     response : Response
         Of the sensors.
+    facing : (n, 3) float64 or None
+        Unit normals of the sensors; None: they are level and look up.
 
     Returns
     -------
@@ -100,13 +103,16 @@ def trace(
         dr.opaque(mi.UInt32, max_orders + 1 if halved_after is None else halved_after),
         dr.opaque(mi.Float, 0.5 * aperture_m),
     ]
-    points = [mi.Float(points_m[:, k].astype(np.float32)) for k in range(3)]
+    points, normals = (
+        None if vectors is None else [mi.Float(vectors[:, k].astype(np.float32)) for k in range(3)]
+        for vectors in (points_m, facing)
+    )
     every = np.repeat(np.arange(len(points_m)), n_paths)
     parts = []
     for low in range(0, len(every), PATHS_PER_KERNEL):
         start = every[low : low + PATHS_PER_KERNEL]
         number = low + np.arange(len(start)) - (ends - n_paths - first)[start]
-        parts.append(_trace_block(scene, points, start, number, response, *fixed))
+        parts.append(_trace_block(scene, points, normals, start, number, response, *fixed))
     start, direction, orders, weight, cut = (
         np.concatenate([part[k] for part in parts]) for k in range(5)
     )
@@ -115,7 +121,9 @@ def trace(
     return Paths(start[left], direction[left], orders[left], weight[left], lost)
 
 
-def _trace_block(scene, points, start, number, response, seed, max_orders, halved_after, radius):
+def _trace_block(
+    scene, points, normals, start, number, response, seed, max_orders, halved_after, radius
+):
     """Trace the paths of one kernel; those that were absorbed by chance are left out."""
     mi = scene.mi
     n = len(number)
@@ -127,12 +135,16 @@ def _trace_block(scene, points, start, number, response, seed, max_orders, halve
     first = sensor_response.directions(response, flat.x, flat.y, dr.squared_norm(flat), dr)
     on_disc = mi.warp.square_to_uniform_disk(mi.Point2f(rng.next_float32(), rng.next_float32()))
     centre = mi.Point3f(*(dr.gather(mi.Float, axis, start) for axis in points))
-    origin = centre + radius * mi.Vector3f(on_disc.x, on_disc.y, 0)
+    across, first = mi.Vector3f(on_disc.x, on_disc.y, 0), mi.Vector3f(*first)
+    if normals is not None:
+        turn = mi.Frame3f(mi.Vector3f(*(dr.gather(mi.Float, axis, start) for axis in normals)))
+        across, first = turn.to_world(across), turn.to_world(first)
+    origin = centre + radius * across
     direction, escaped, alive, weight, orders = _follow(
         mi,
         scene,
         origin,
-        mi.Vector3f(*first),
+        first,
         rng,
         dr.full(mi.Bool, True, n),
         max_orders,

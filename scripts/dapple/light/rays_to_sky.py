@@ -5,12 +5,13 @@ from voxel to voxel. Made for many points and times, as in fitting a tree to rec
 """
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import drjit as dr
 import numpy as np
 
 from dapple.optics import sensor_response
-from dapple.optics.responses import COSINE, Response
+from dapple.optics.responses import COSINE, NAMED, Response
 from dapple.scene import patterns, traced
 from dapple.scene.surfaces import Scene
 from dapple.scene.traced import TracedScene
@@ -18,6 +19,8 @@ from dapple.sky.patches import Patches, patches
 
 RAYS_PER_KERNEL = 1 << 22
 """Bounds memory: a ray takes about 100 bytes."""
+EVEN = NAMED["hemispherical"]
+"""Rays that are spread evenly over the solid angle."""
 
 SunRays = Callable[[np.ndarray, int, int, int], tuple[np.ndarray, np.ndarray]]
 SkyRays = Callable[[np.ndarray, int, int, int], np.ndarray]
@@ -29,10 +32,11 @@ def sun_rays(
     sun_directions: np.ndarray,
     *,
     sun_diameter_deg: float,
-    aperture_m: float,
     seed: int,
+    aperture_m: float = 0.0,
+    facing: np.ndarray | None = None,
 ) -> SunRays:
-    """Prepare rays from level entrances to the sun's disc.
+    """Prepare rays from sensors' entrances to the sun's disc.
 
     Parameters
     ----------
@@ -44,10 +48,12 @@ def sun_rays(
         Unit vectors towards the middle of the sun.
     sun_diameter_deg : float
         Angular diameter of the disc [deg].
-    aperture_m : float
-        Diameter of the level entrance around each point; 0 is a point [m].
     seed : int
         Shifts the pattern differently for each pair of point and sun and each replicate.
+    aperture_m : float
+        Diameter of the entrance around each point; 0 is a point [m].
+    facing : (n, 3) float64 or None
+        Unit normals of the entrances; None: level ones.
 
     Returns
     -------
@@ -58,6 +64,7 @@ def sun_rays(
     """
     mi = scene.mi
     points, axes = (_columns(mi, vectors) for vectors in (points_m, sun_directions))
+    normals = None if facing is None else _columns(mi, facing)
     radius = dr.opaque(mi.Float, float(np.sin(np.radians(0.5 * sun_diameter_deg))))
     half_aperture = dr.opaque(mi.Float, 0.5 * aperture_m)
     n_suns, key = dr.opaque(mi.UInt32, len(sun_directions)), dr.opaque(mi.UInt32, seed)
@@ -75,7 +82,7 @@ def sun_rays(
         way = dr.normalize(mi.Frame3f(axis).to_world(mi.Vector3f(radius * x, radius * y, 1.0)))
         if aperture_m:
             x, y = _disc(u[2], u[3])
-            start += half_aperture * mi.Vector3f(x, y, 0.0)
+            start += half_aperture * _turned(mi, mi.Vector3f(x, y, 0.0), normals, point)
         seen = scene.transmittance(start, way, (way.z > 0) & (axis.z > 0))
         sums, squares = (dr.block_sum(x, n_rays) for x in (seen, seen * seen))
         dr.eval(sums, squares)
@@ -99,6 +106,7 @@ def sky_rays(
     *,
     seed: int,
     response: Response = COSINE,
+    facing: np.ndarray | None = None,
 ) -> SkyRays:
     """Prepare rays from points to the patches of the sky.
 
@@ -113,23 +121,34 @@ def sky_rays(
     seed : int
         Shifts the pattern differently for each point, replicate and patch.
     response : Response
-        Of the level sensors at the points.
+        Of the sensors at the points.
+    facing : (n, 3) float64 or None
+        Unit normals of the sensors; None: they are level.
 
     Returns
     -------
     callable
         Of points (m,), a number of replicates r, the first ray's number and the number of rays in
-        a patch and replicate. It returns the sums (m, r, p) of what the rays see, 0 to 1 each;
-        rays are spread over a patch as light counts at the sensor.
+        a patch and replicate. It returns the sums (m, r, p) of what the rays bring of what a level
+        sensor in the open reads of a patch, 0 to 1 each, or more where a sensor is tilted.
+
+    Notes
+    -----
+    For level sensors rays are spread over a patch as light counts, so that each counts the same.
+    What a tilted sensor reads of light differs within a patch and from sensor to sensor: rays are
+    spread evenly over the solid angle, and weighted.
     """
     mi = scene.mi
     points = _columns(mi, points_m)
+    normals = None if facing is None else _columns(mi, facing)
+    drawn = response if facing is None else EVEN
     width = 2 * np.pi / np.repeat(sky.row_count, sky.row_count)
     start = (np.arange(sky.n) - np.repeat(sky.row_start, sky.row_count) - 0.5) * width
-    below = sensor_response.share_below(response, sky.row_sine)
+    below = sensor_response.share_below(drawn, sky.row_sine)
     low, high = (np.repeat(bound, sky.row_count) for bound in (below[:-1], below[1:]))
     # Within a patch the share that comes from below and the azimuth are even.
     table = _columns(mi, np.stack([low, high - low, start, width], axis=1))
+    weight = mi.Float(sky.solid_angle_sr / sky.seen_solid_angle_sr(response))
     n_patches, key = dr.opaque(mi.UInt32, sky.n), dr.opaque(mi.UInt32, seed)
 
     def block(items, point, pattern, n_rays: int):
@@ -139,12 +158,17 @@ def sky_rays(
         low, height, start, width = (
             dr.gather(mi.Float, column, item % n_patches) for column in table
         )
-        level, up = sensor_response.height(response, dr.fma(u[0], height, low), dr)
+        level, up = sensor_response.height(drawn, dr.fma(u[0], height, low), dr)
         east, north = dr.sincos(dr.fma(u[1], width, start))
         way = mi.Vector3f(level * east, level * north, up)
         point = dr.gather(mi.UInt32, mi.UInt32(point.astype(np.uint32)), number)
         origin = mi.Point3f(*(dr.gather(mi.Float, a, point) for a in points))
-        return np.array(dr.block_sum(scene.transmittance(origin, way, way.z > 0), n_rays))
+        seen = scene.transmittance(origin, way, way.z > 0)
+        if normals is not None:
+            cosine = dr.dot(way, _gathered(mi, normals, point))
+            counts = sensor_response.value(response, cosine, dr)
+            seen *= counts * dr.gather(mi.Float, weight, item % n_patches)
+        return np.array(dr.block_sum(seen, n_rays))
 
     def trace(chosen: np.ndarray, n_replicates: int, first: int, n_rays: int):
         pattern = _columns(mi, patterns.kronecker(first + n_rays, 2)[first:])
@@ -173,14 +197,7 @@ class Tracer:
         self.scene = traced.load(scene, variant)
 
     def sun_visibility(
-        self,
-        points_m: np.ndarray,
-        sun_directions: np.ndarray,
-        *,
-        n_disc: int,
-        seed: int,
-        sun_diameter_deg: float,
-        aperture_m: float = 0.0,
+        self, points_m: np.ndarray, sun_directions: np.ndarray, *, n_disc: int, **options: Any
     ) -> np.ndarray:
         """Share of the sun's disc that each point sees in each direction of the sun.
 
@@ -192,12 +209,8 @@ class Tracer:
             Unit vectors towards the middle of the sun; below the horizon nothing is seen.
         n_disc : int
             Rays per point and direction, evenly spread over the disc.
-        seed : int
-            Turns the pattern differently for each point and direction.
-        sun_diameter_deg : float
-            Angular diameter of the disc [deg].
-        aperture_m : float
-            Diameter of the level entrance around each point [m]; 0 is a point.
+        **options
+            Of `sun_rays`.
 
         Returns
         -------
@@ -205,19 +218,18 @@ class Tracer:
             0 (shade) to 1 (full sun); with turbid voxels the mean transmittance.
         """
         shape = len(points_m), len(sun_directions)
-        trace = sun_rays(
-            self.scene,
-            points_m,
-            sun_directions,
-            sun_diameter_deg=sun_diameter_deg,
-            aperture_m=aperture_m,
-            seed=seed,
-        )
+        trace = sun_rays(self.scene, points_m, sun_directions, **options)
         seen = trace(np.arange(shape[0] * shape[1]), 1, 0, n_disc)[0] / n_disc
         return seen.reshape(shape).astype(np.float32)
 
     def sky_visibility(
-        self, points_m: np.ndarray, *, n: int, seed: int, response: Response = COSINE
+        self,
+        points_m: np.ndarray,
+        *,
+        n: int,
+        seed: int,
+        response: Response = COSINE,
+        facing: np.ndarray | None = None,
     ) -> np.ndarray:
         """What is left of an even sky's reading at each point: diffuse light below over above.
 
@@ -229,14 +241,17 @@ class Tracer:
             Rays per point.
         seed : int
         response : Response
-            Of level sensors at the points.
+            Of sensors at the points.
+        facing : (p, 3) array or None
+            Their unit normals; None: they are level.
 
         Returns
         -------
         (p,) float32
-            1 in the open.
+            1 in the open for a level sensor.
         """
-        trace = sky_rays(self.scene, points_m, patches(1), seed=seed, response=response)
+        dome = patches(1)
+        trace = sky_rays(self.scene, points_m, dome, seed=seed, response=response, facing=facing)
         return trace(np.arange(len(points_m)), 1, 0, n)[:, 0, 0] / np.float32(n)
 
 
@@ -269,6 +284,18 @@ def _shifted(mi, pattern: list, ray, item, key) -> list:
         for column, word in zip(pattern, words, strict=True)
     ]
     return [point - dr.floor(point) for point in points]
+
+
+def _gathered(mi, columns: list, index):
+    """Vectors by their numbers."""
+    return mi.Vector3f(*(dr.gather(mi.Float, column, index) for column in columns))
+
+
+def _turned(mi, vector, normals: list | None, index):
+    """Vectors in the frame of a sensor, whose normal is z there, as they lie in the scene."""
+    if normals is None:
+        return vector
+    return mi.Frame3f(_gathered(mi, normals, index)).to_world(vector)
 
 
 def _disc(u, v):

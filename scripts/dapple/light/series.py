@@ -15,7 +15,7 @@ from dapple.light.tensor import (
 )
 from dapple.light.visibility import Sunlit
 from dapple.scene.scene_optics import Optics
-from dapple.sky.open_sky import level_beam, towards_sun
+from dapple.sky.open_sky import open_beam, towards_sun
 from dapple.sky.patches import patches
 from dapple.sky.sky_radiance import patch_radiance
 
@@ -53,6 +53,7 @@ def compute(
     optics: Optics,
     *,
     sun_kernel_deg: float,
+    facing: np.ndarray | None = None,
 ) -> Light:
     """Light of one scene from what was traced in it.
 
@@ -68,6 +69,8 @@ def compute(
         In b bands.
     sun_kernel_deg : float
         Over which angle around the sun scattered paths are averaged [deg].
+    facing : (n, 3) float64 or None
+        Unit normals of the sensors; None: they are level.
 
     Returns
     -------
@@ -82,7 +85,7 @@ def compute(
     from_sky, scattered, variance = (
         np.concatenate(part, axis=1) for part in zip(*blocks, strict=True)
     )
-    beam = level_beam(sky, transport.response)
+    beam = open_beam(sky, transport.response, facing)
     # Shadow rays and paths are drawn independently: their variances add.
     return Light(
         direct=sunlit.share.mean(axis=0) * beam,

@@ -34,8 +34,8 @@ class Transport:
     Attributes
     ----------
     sky_seen : (n_sensors, r, p) float32
-        Share of every sky patch that each sensor sees, weighted by its response, in independent
-        replicates; with voxels the transmittance.
+        What each sensor reads of every sky patch over what a level one in the open reads of it, in
+        independent replicates; with voxels the transmittance. A tilted sensor may read more.
     sensor, replicate, patch : (k,) int32
         Where a path started, in which independent set, and in which sky patch it left.
     orders : (k, n) uint8

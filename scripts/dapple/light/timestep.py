@@ -1,7 +1,7 @@
 """Light at sensors at one time, by Mitsuba's own path tracers: the reference engine.
 
-A sensor is level and looks up. Its reading is an integral over the upper hemisphere of radiance
-times the sensor's response, with the cosine irradiance; each radiance comes from Mitsuba's `path`
+A sensor's reading is an integral over the hemisphere above its plane of radiance times the sensor's
+response, with the cosine irradiance; each radiance comes from Mitsuba's `path`
 or `volpath` integrator, asked along rays that start at the sensor:
 
 * direct: rays to points of the sun's disc, no scattering. While they are traced every direction
@@ -19,7 +19,7 @@ import numpy as np
 
 from dapple import engine
 from dapple.errors import InputError
-from dapple.frames import direction_from_angles
+from dapple.frames import across, direction_from_angles
 from dapple.optics import sensor_response
 from dapple.optics.responses import COSINE, Response
 from dapple.scene import patterns
@@ -79,8 +79,9 @@ def timestep(
     seed: int,
     aperture_m: float = 0.0,
     response: Response = COSINE,
+    facing: np.ndarray | None = None,
 ) -> dict[str, np.ndarray]:
-    """What level sensors read under one sun and one sky.
+    """What sensors read under one sun and one sky.
 
     Parameters
     ----------
@@ -101,9 +102,11 @@ def timestep(
     rays : Rays
     seed : int
     aperture_m : float
-        Diameter of the sensors' level entrance; 0 is a point [m].
+        Diameter of the sensors' entrance; 0 is a point [m].
     response : Response
         Of the sensors.
+    facing : (n, 3) array or None
+        Unit normals of the sensors; None: they are level and look up.
 
     Returns
     -------
@@ -120,6 +123,8 @@ def timestep(
     # plugins and types belong to a variant: another one may have been set since the scene was built
     engine.load(scene.variant)
     sensors = _checked(np.asarray(sensors_m, dtype=np.float64), scene.ground_z_m)
+    upright = np.tile([0.0, 0.0, 1.0], (len(sensors), 1)) if facing is None else facing
+    axes = np.concatenate([across(upright), upright[:, None]], axis=1)
     towards_sun = direction_from_angles(sun_zenith_deg, sun_azimuth_deg)
     if sun_zenith_deg >= 90.0:
         beam, towards_sun = np.zeros_like(beam), np.array([0.0, 0.0, 1.0])
@@ -130,12 +135,12 @@ def timestep(
             sine = max(np.sin(np.radians(0.5 * sun_diameter_deg)), POINT_SINE)
             scene.set_even_sky(beam / (np.pi * sine**2))
             parts["direct"] = _direct(
-                scene, sensors, towards_sun, sine, rays, aperture_m, response, seed
+                scene, sensors, axes, towards_sun, sine, rays, aperture_m, response, seed
             )
         scene.set_sun(towards_sun, beam)
         scene.set_sky(sky, diffuse)
         for part in ("sky", "scattered") if diffuse.any() else ("scattered",):
-            parts[part] = _hemisphere(scene, sensors, part, rays, aperture_m, response, seed)
+            parts[part] = _hemisphere(scene, sensors, axes, part, rays, aperture_m, response, seed)
     return _summary(parts, scene.n_bands)
 
 
@@ -156,6 +161,7 @@ def _checked(sensors: np.ndarray, ground_z_m: float) -> np.ndarray:
 def _direct(
     scene: RenderScene,
     sensors: np.ndarray,
+    axes: np.ndarray,
     towards_sun: np.ndarray,
     sine: float,
     rays: Rays,
@@ -166,12 +172,13 @@ def _direct(
     """(n, replicates, 3) reading by rays to points of the sun's disc, its radius a sine."""
     seed = stream_seed(seed, "direct")
     square = patterns.shifted(rays.direct, 4, (len(sensors), rays.replicates), seed)
-    start = _starts(sensors, square[..., 2:], aperture_m)
+    start = _starts(sensors, axes, square[..., 2:], aperture_m)
     # even in the disc as it is seen from below: the cosine with its axis weighs solid angle
     flat = sine * patterns.disc(square[..., :2])
     axial = np.sqrt(1.0 - (flat**2).sum(axis=-1, keepdims=True))
-    way = flat @ _across(towards_sun) + axial * towards_sun
-    weight = np.pi * sine**2 / axial * sensor_response.value(response, way[..., 2:])
+    way = flat @ across(towards_sun) + axial * towards_sun
+    cosine = np.einsum("srki,si->srk", way, axes[:, 2])[..., None]
+    weight = np.pi * sine**2 / axial * sensor_response.value(response, cosine)
     integrator = {"type": scene.integrator, "max_depth": 1}
     radiance = _radiance(scene, integrator, start, way, way[..., 2] > 0.0, seed)
     return (radiance * weight).mean(axis=2)
@@ -180,6 +187,7 @@ def _direct(
 def _hemisphere(
     scene: RenderScene,
     sensors: np.ndarray,
+    axes: np.ndarray,
     part: str,
     rays: Rays,
     aperture_m: float,
@@ -197,10 +205,11 @@ def _hemisphere(
         }
     n_rays = rays.sky if part == "sky" else rays.scattered
     square = patterns.shifted(n_rays, 4, (len(sensors), rays.replicates), seed)
-    start = _starts(sensors, square[..., 2:], aperture_m)
+    start = _starts(sensors, axes, square[..., 2:], aperture_m)
     flat = patterns.disc(square[..., :2])
     x, y, squared_radius = flat[..., 0], flat[..., 1], (flat**2).sum(axis=-1)
     way = np.stack(sensor_response.directions(response, x, y, squared_radius), axis=-1)
+    way = np.einsum("srkj,sji->srki", way, axes)
     seen = np.ones(way.shape[:-1], dtype=bool)
     radiance = _radiance(scene, integrator, start, way, seen, seed)
     return sensor_response.integral_sr(response) * radiance.mean(axis=2)
@@ -234,19 +243,12 @@ def _radiance(
     return radiance
 
 
-def _starts(sensors: np.ndarray, square: np.ndarray, aperture_m: float) -> np.ndarray:
-    """(n, replicates, rays, 3) points on the sensors' level entrances."""
-    level = 0.5 * aperture_m * patterns.disc(square)
-    shift = np.concatenate([level, np.zeros((*level.shape[:-1], 1))], axis=-1)
-    return sensors[:, None, None] + shift
-
-
-def _across(axis: np.ndarray) -> np.ndarray:
-    """(2, 3) unit vectors at right angles to a unit vector and to each other."""
-    helper = np.array([1.0, 0.0, 0.0]) if abs(axis[0]) < 0.7 else np.array([0.0, 1.0, 0.0])
-    first = np.cross(axis, helper)
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(axis, first)])
+def _starts(
+    sensors: np.ndarray, axes: np.ndarray, square: np.ndarray, aperture_m: float
+) -> np.ndarray:
+    """(n, replicates, rays, 3) points on the sensors' entrances, (n, 3, 3) whose axes these are."""
+    flat = 0.5 * aperture_m * patterns.disc(square)
+    return sensors[:, None, None] + np.einsum("srkj,sji->srki", flat, axes[:, :2])
 
 
 def _summary(parts: dict[str, np.ndarray], n_bands: int) -> dict[str, np.ndarray]:

@@ -14,6 +14,7 @@ from dapple.optics.responses import COSINE, Response
 from dapple.scene import mitsuba_scene
 from dapple.scene.render_scene import RenderScene
 from dapple.scene.scene_optics import Optics, group_bands, group_flux
+from dapple.scene.sensors import facing_of
 from dapple.scene.surfaces import Scene
 from dapple.sky.sky_radiance import in_directions
 from dapple.streams import stream_seed
@@ -97,6 +98,7 @@ class Reference:
                 rays=self.rays,
                 aperture_m=self.aperture_m,
                 response=self.response,
+                facing=facing_of(sensors),
                 seed=stream_seed(self.seed, placement, index),
             )
             for placement, scene in enumerate(self.rendered)

@@ -59,6 +59,7 @@ def collect(
     halved_after: int | None = None,
     aperture_m: float = 0.0,
     response: Response = COSINE,
+    facing: np.ndarray | None = None,
     n_replicates: int = N_REPLICATES,
 ) -> Transport:
     """Trace rays to the sky and paths from each sensor, in equal parts for every replicate.
@@ -68,7 +69,7 @@ def collect(
     scene : TracedScene
         What light meets.
     sensors_m : (n, 3) float64
-        Level sensors that look up [m].
+        Places of the sensors [m].
     n_paths : int
         Of each sensor at first.
     n_patches : int
@@ -81,7 +82,7 @@ def collect(
         Straight rays to the sky of each sensor at first, at least one to a patch and replicate.
     growth : Growth or None
         When more rays and paths are traced. None: the first are enough.
-    halved_after, aperture_m, response
+    halved_after, aperture_m, response, facing
         See `paths.trace`. Rays to the sky start at the middle of the aperture.
     n_replicates : int
         Independent sets, at least 2.
@@ -95,7 +96,7 @@ def collect(
 
     def look(done: np.ndarray, wanted: np.ndarray, seen: np.ndarray | None) -> np.ndarray:
         seed_of_sky = stream_seed(seed, "sky")
-        rays = sky_rays(scene, sensors_m, sky, seed=seed_of_sky, response=response)
+        rays = sky_rays(scene, sensors_m, sky, seed=seed_of_sky, response=response, facing=facing)
         if seen is None:
             seen = np.zeros((len(sensors_m), n_replicates, sky.n), np.float32)
         for number, target in sorted({*zip(done.tolist(), wanted.tolist(), strict=True)}):
@@ -116,6 +117,7 @@ def collect(
             halved_after=halved_after,
             aperture_m=aperture_m,
             response=response,
+            facing=None if facing is None else np.repeat(facing, n_replicates, axis=0),
         )
         more = _tallied(paths, scene.counters, wanted - done, seen, max_orders, response)
         return more if counted is None else _added(counted, more)

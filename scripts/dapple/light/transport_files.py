@@ -22,7 +22,7 @@ SENSORS = {
     "n_paths": "paths started from the sensor in each replicate",
     "cut": "paths given up at max_orders, of all replicates",
 }
-SKY = "share of the sky patch that the sensor sees, weighted by the cosine"
+SKY = "what the sensor reads of the sky patch over what a level one in the open reads of it"
 
 
 def write(path: str | Path, transport: Transport) -> None:

@@ -46,6 +46,7 @@ def sunlit(
     sun_diameter_deg: float,
     n_replicates: int = 8,
     aperture_m: float = 0.0,
+    facing: np.ndarray | None = None,
 ) -> Sunlit:
     """Trace shadow rays to the sun's disc, more of them where it is partly hidden.
 
@@ -69,7 +70,10 @@ def sunlit(
     n_replicates : int
         Independent sets of rays, at least 2.
     aperture_m : float
-        Diameter of the sensors' level receiving discs [m].
+        Diameter of the sensors' receiving discs [m].
+    facing : (n, 3) float64 or None
+        Unit normals of the sensors; None: they are level. The share of the disc that is seen does
+        not depend on them where sensors are points.
 
     Returns
     -------
@@ -91,6 +95,7 @@ def sunlit(
         sun_diameter_deg=sun_diameter_deg,
         aperture_m=aperture_m,
         seed=seed,
+        facing=facing,
     )
     pairs, rays = up, min(FIRST_RAYS, most)
     before = 0

@@ -28,9 +28,19 @@ def _areas(response: Response) -> np.ndarray:
     return 0.5 * (relative[1:] + relative[:-1]) * np.diff(cosine)
 
 
-def value(response: Response, cosine: np.ndarray) -> np.ndarray:
-    """Relative response to light that comes at a cosine from the normal; none from below."""
-    return np.where(cosine > 0, np.interp(cosine, *_knots(response)), 0.0)
+def value(response: Response, cosine: Any, maths: ModuleType = np) -> Any:
+    """Relative response to light that comes at a cosine from the normal; none from behind.
+
+    `maths` is numpy, or drjit for its arrays.
+    """
+    knots, relative = _knots(response)
+    if maths is np:
+        return np.where(cosine > 0, np.interp(cosine, knots, relative), 0.0)
+    slopes = np.diff(relative) / np.diff(knots)
+    found = relative[0]
+    for knot, width, slope in zip(knots, np.diff(knots), slopes, strict=False):
+        found = found + float(slope) * maths.clip(cosine - float(knot), 0.0, float(width))
+    return maths.select(cosine > 0, found, 0.0)
 
 
 def integral_sr(response: Response) -> float:

@@ -12,8 +12,9 @@ from dapple.errors import InputError
 from dapple.light import rays_to_sky
 from dapple.optics.responses import Response
 from dapple.registration import fit
+from dapple.scene.sensors import facing_of
 from dapple.scene.surfaces import Scene
-from dapple.sky.open_sky import level_beam, level_diffuse, towards_sun
+from dapple.sky.open_sky import open_beam, open_diffuse, towards_sun
 
 FINE_STEP_S = 120.0
 """Times of the simulated shade; the sun moves by half its disc in a minute."""
@@ -74,13 +75,14 @@ def register(
     known = sensors.set_index("sensor").loc[table.index]
     used = parts.fitting.any(axis=1)
     points_m = known[["x_m", "y_m", "z_m"]].to_numpy()[used]
+    facing = facing_of(known[used])
     margin = pd.Timedelta(seconds=max_clock_offset_s + FINE_STEP_S)
     fine = pd.date_range(
         table.columns[0] - margin, table.columns[-1] + margin, freq=f"{FINE_STEP_S:g}s"
     )
     sky = sky_at(fine)
     sun = towards_sun(sky)
-    beam, diffuse = level_beam(sky, response), level_diffuse(sky, response)
+    beam, diffuse = open_beam(sky, response, facing), open_diffuse(sky, response)
     disc: dict[str, Any] = {"n_disc": N_DISC, "seed": seed}
     disc |= {"sun_diameter_deg": sun_diameter_deg, "aperture_m": aperture_m}
     dome: dict[str, Any] = {"n": N_SKY, "seed": seed, "response": response}
@@ -91,8 +93,11 @@ def register(
         moved = np.repeat(points_m[None], len(shifts), axis=0)
         moved[:, :, :2] -= shifts[:, None, :]
         moved = moved.reshape(-1, 3)
-        sunlit = np.mean([t.sun_visibility(moved, sun, **disc) for t in tracers], axis=0)
-        open_sky = np.mean([t.sky_visibility(moved, **dome) for t in tracers], axis=0)
+        faced: dict[str, Any] = {
+            "facing": None if facing is None else np.tile(facing, (len(shifts), 1))
+        }
+        sunlit = np.mean([t.sun_visibility(moved, sun, **disc, **faced) for t in tracers], axis=0)
+        open_sky = np.mean([t.sky_visibility(moved, **dome, **faced) for t in tracers], axis=0)
         shape = len(shifts), len(points_m), -1
         return sunlit.reshape(shape), open_sky.reshape(shape)
 

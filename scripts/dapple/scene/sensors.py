@@ -1,4 +1,4 @@
-"""Where the light is measured: horizontal PAR sensors."""
+"""Where the light is measured: PAR sensors, level or tilted."""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -7,10 +7,12 @@ import numpy as np
 import pandas as pd
 from scipy.spatial import cKDTree
 
+from dapple import findings
 from dapple.errors import InputError
 from dapple.formats import column_names, ground_surface, user_tables
 from dapple.formats.ground_surface import GroundSurface
 from dapple.formats.meshes import Mesh
+from dapple.frames import direction_from_angles
 from dapple.scene.surfaces import GROUND, Surface
 
 COLUMN_NAMES = {
@@ -32,6 +34,10 @@ COLUMN_NAMES = {
     ),
 }
 POSITION = ["x_m", "y_m", "z_m"]
+TILT = ("tilt_deg", "tilt", "inclination_deg", "inclination", "neigung")
+AZIMUTH = ("azimuth_deg", "azimuth", "aspect_deg", "aspect", "azimut", "orientation_deg")
+CALIBRATION = ("calibration", "calibration_factor")
+LARGEST = {"tilt_deg": 180.0, "azimuth_deg": 360.0}
 DEEPEST_M, LIFT_M = 0.15, 0.01
 """So far below the ground a sensor still lies on it, and so far above it is laid then."""
 
@@ -45,32 +51,41 @@ def read(
     y_column: str = "",
     z_column: str = "",
     decimal: str = "",
+    heights: str = "world",
+    tilt_deg: float = 0.0,
+    azimuth_deg: float | None = None,
 ) -> pd.DataFrame:
-    """Read sensor positions.
+    """Read where sensors stand and where they face.
 
     Parameters
     ----------
     path : path
-        A text table with columns of labels and of world coordinates [m], and perhaps `calibration`,
-        by which the records of a sensor are multiplied; further columns are ignored.
+        A text table with columns of labels and of world coordinates [m], and perhaps `tilt_deg` and
+        `azimuth_deg` of the normal, and `calibration`, by which the records of a sensor are
+        multiplied; further columns are ignored. A row that stands there twice is read once.
     origin_m : (3,) float
         World coordinates of the local origin [m].
     sensor_column, x_column, y_column, z_column : str
         Empty: found by the usual names, `COLUMN_NAMES`; capitals do not matter.
     decimal : {"", ".", ","}
         Decimal sign; empty: as the cells show.
+    heights : {"world", "above_ground"}
+        Whether the heights of the table are coordinates, or heights above the ground below each
+        sensor, to be laid upon it by `on_ground`.
+    tilt_deg, azimuth_deg : float, float or None
+        Of all sensors, where the table has no such column [°].
 
     Returns
     -------
     pandas.DataFrame
-        `sensor` (text), `x_m`, `y_m`, `z_m` in the local frame [m], in the order of the file; and
-        `calibration` where the file has it.
+        `sensor` (text), `x_m`, `y_m`, `z_m` in the local frame [m], in the order of the file;
+        `tilt_deg` and `azimuth_deg` where a sensor is tilted; `calibration` where the file has it.
 
     Raises
     ------
     InputError
         No file, column or row; a label that is missing or repeated; a coordinate that is not a
-        number; a calibration that is not positive.
+        number; a calibration that is not positive; a tilt without the azimuth to which it is.
     """
     source = user_tables.read(path, decimal=decimal)
     asked = dict(zip(COLUMN_NAMES, (sensor_column, x_column, y_column, z_column), strict=True))
@@ -81,7 +96,6 @@ def read(
         for name, aliases in COLUMN_NAMES.items()
     }
     labels = source.text(columns["sensor"])
-    _check_labels(labels, path)
     numbers = pd.DataFrame({name: source.numbers(columns[name]).values for name in POSITION})
     wrong = ~np.isfinite(numbers).all(axis=1).to_numpy()
     if wrong.any():
@@ -93,19 +107,93 @@ def read(
             "three numbers",
             "Complete its coordinates or remove the sensor.",
         )
-    table = numbers - np.asarray(origin_m, float)
+    table = numbers - np.asarray(origin_m, float) * [1.0, 1.0, float(heights == "world")]
     table.insert(0, "sensor", labels.to_numpy())
-    if column := source.find(["calibration", "calibration_factor"]):
-        factor = source.numbers(column).values
-        if not (factor > 0).all():
+    angles = {"tilt_deg": (TILT, tilt_deg), "azimuth_deg": (AZIMUTH, azimuth_deg)}
+    for name, (names, of_all) in angles.items():
+        column = source.find(names)
+        table[name] = source.numbers(column).values if column else of_all
+    if column := source.find(CALIBRATION):
+        table["calibration"] = source.numbers(column).values
+    table = table.drop_duplicates(ignore_index=True)
+    if len(table) < len(numbers):
+        findings.say([findings.note(path, f"{len(numbers) - len(table)} rows twice, read once")])
+    _check_labels(table["sensor"], path)
+    if "calibration" in table:
+        _check_calibration(table, path)
+    return turned(table, path)
+
+
+def turned(
+    table: pd.DataFrame,
+    where: str | Path = "sensors",
+    *,
+    tilt_deg: float | None = None,
+    azimuth_deg: float | None = None,
+) -> pd.DataFrame:
+    """Sensors with the angles of their normals, or without where all are level.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        With `tilt_deg` and `azimuth_deg`, unless they are given here for all sensors.
+    where : str or path
+        The file or key, for messages.
+    tilt_deg : float or None
+        Of the normal from straight up [°].
+    azimuth_deg : float or None
+        To where the normal leans, clockwise from north [°].
+
+    Raises
+    ------
+    InputError
+        Angles out of range, or a tilt without an azimuth.
+    """
+    if tilt_deg is not None:
+        table = table.assign(tilt_deg=tilt_deg, azimuth_deg=azimuth_deg)
+    angles = table[["tilt_deg", "azimuth_deg"]].astype(float)
+    table = table.drop(columns=list(angles))
+    if (angles["tilt_deg"] == 0).all():
+        return table
+    angles.loc[angles["tilt_deg"] == 0, "azimuth_deg"] = 0.0
+    for name, largest in LARGEST.items():
+        wrong = ~angles[name].between(0.0, largest).to_numpy()
+        if wrong.any():
+            first = int(wrong.argmax())
             raise InputError(
-                path,
-                f"calibration {source.text(column)[~(factor > 0)].iloc[0]!r}",
-                "a factor above 0 in every row",
-                "Write 1 where records need none.",
+                where,
+                f"{name} {angles[name].iloc[first]:g} of sensor {table['sensor'].iloc[first]}",
+                f"0 to {largest:g} degrees for every tilted sensor",
+                "tilt_deg is the angle between the sensor's normal and straight up; azimuth_deg "
+                "says to where the normal leans, clockwise from north. Complete both columns, or "
+                "set `sensors.tilt_deg` and `sensors.azimuth_deg` for all.",
             )
-        table["calibration"] = factor
-    return table
+    return pd.concat([table, angles], axis=1)
+
+
+def facing_of(table: pd.DataFrame) -> np.ndarray | None:
+    """Unit normals (n, 3) of sensors, or None where all are level and look up."""
+    if "tilt_deg" not in table:
+        return None
+    return direction_from_angles(table["tilt_deg"].to_numpy(), table["azimuth_deg"].to_numpy())
+
+
+def on_ground(table: pd.DataFrame, ground: GroundSurface) -> pd.DataFrame:
+    """Sensors whose heights are above the ground below them, in the local frame."""
+    below = ground.height_m(table[["x_m", "y_m"]].to_numpy(float))
+    return table.assign(z_m=table["z_m"] + below)
+
+
+def _check_calibration(table: pd.DataFrame, path: str | Path) -> None:
+    wrong = ~(table["calibration"] > 0)
+    if wrong.any():
+        first = table[wrong].iloc[0]
+        raise InputError(
+            path,
+            f"calibration {first['calibration']:g} of sensor {first['sensor']}",
+            "a factor above 0 in every row",
+            "Write 1 where records need none.",
+        )
 
 
 def grid_around(
