@@ -109,5 +109,5 @@ def _raw(path: Path, values: np.ndarray) -> RawCloud:
     attributes: dict[str, np.ndarray] = {}
     for name, found in zip(others, distinct(map(attribute_name, others)), strict=True):
         attributes |= columns(found, values[name][there])
-    source = Source(len(there), left_out={MISSED: missed} if missed else {})
+    source = Source(len(xyz), left_out={MISSED: missed} if missed else {})
     return RawCloud(xyz[there], attributes=attributes, source=source)
