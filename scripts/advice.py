@@ -10,6 +10,7 @@ from dapple.formats import json, netcdf, tables
 from dapple.formats.atomic import atomic
 from dapple.light.light_model import Model, Tracing
 from dapple.scene import scene_files, scene_optics, sensors, traced
+from dapple.scene.facing import facing_of
 from dapple.workflow import run
 
 HEAD = """\
@@ -36,7 +37,7 @@ def main(snakemake):
         finest=Model(max_orders=params.max_orders, bands=len(optics)),
         tracing=Tracing(**params.tracing),
         repeats=params.repeats,
-        facing=sensors.facing_of(table.iloc[chosen]),
+        facing=facing_of(table.iloc[chosen]),
         seed=params.seed,
     )
     base = scene_files.read([inputs.leaves], inputs.wood, around)[0]

@@ -5,6 +5,7 @@ from dapple.formats import json, netcdf, tables
 from dapple.light import light_datasets, series, transport_files
 from dapple.light.light_model import Model, Tracing
 from dapple.scene import scene_files, scene_optics, sensors, traced
+from dapple.scene.facing import facing_of
 from dapple.streams import stream_seed
 from dapple.workflow import run
 
@@ -14,7 +15,7 @@ def main(snakemake):
     around = scene_files.around(inputs.ground or params.ground_z_m, inputs.shade)
     sky, optics = netcdf.read(inputs.sky), scene_optics.read(inputs.optics)
     table = tables.read(inputs.sensors)
-    sensors_m, facing = table[sensors.POSITION].to_numpy(), sensors.facing_of(table)
+    sensors_m, facing = table[sensors.POSITION].to_numpy(), facing_of(table)
     model = Model(**(json.read(inputs.model) if inputs.model else {"bands": len(optics)}))
     tracing = Tracing(**params.tracing)
     placements = []

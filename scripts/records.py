@@ -5,7 +5,7 @@ import pandas as pd
 
 from dapple import findings
 from dapple.formats import json, netcdf, tables
-from dapple.scene.sensors import facing_of
+from dapple.scene.facing import facing_of
 from dapple.sky.open_sky import open_sky_par
 from dapple.stats import measured, plausible_records
 from dapple.stats.measured import Records

@@ -8,6 +8,7 @@ from dapple import engine
 from dapple.formats import netcdf, tables
 from dapple.light.moved_sensors import moved_light
 from dapple.scene import scene_files, sensors, traced
+from dapple.scene.facing import facing_of
 from dapple.stability import worse_records
 from dapple.stats.pairs import simulated
 from dapple.workflow import run
@@ -27,7 +28,7 @@ def main(snakemake):
     light = {Path(path).stem: netcdf.read(path).sel(sensor=labels) for path in inputs.light}
     sky, table = netcdf.read(inputs.sky), tables.read(inputs.sensors).set_index("sensor")
     table = table.loc[labels]
-    sensors_m, facing = table[sensors.POSITION].to_numpy(), sensors.facing_of(table)
+    sensors_m, facing = table[sensors.POSITION].to_numpy(), facing_of(table)
     scenes = {name: loaded(name, inputs, params) for name in params.reconstructions}
 
     def moved(error_m, seed):

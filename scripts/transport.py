@@ -5,6 +5,7 @@ from dapple.formats import json, tables
 from dapple.light import transport_files
 from dapple.light.light_model import Model, Tracing
 from dapple.scene import scene_files, scene_optics, sensors, traced
+from dapple.scene.facing import facing_of
 from dapple.workflow import run
 
 
@@ -23,7 +24,7 @@ def main(snakemake):
         Tracing(**params.tracing),
         # Nominal spectra: the run's own may change without tracing again.
         optics=scene_optics.from_spectra(),
-        facing=sensors.facing_of(table),
+        facing=facing_of(table),
         seed=params.seed,
     )
     started = counted.n_paths * counted.n_replicates

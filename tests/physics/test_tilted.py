@@ -16,7 +16,8 @@ from dapple.light.light_model import Model, Tracing
 from dapple.light.timestep_series import Reference
 from dapple.optics.responses import NAMED
 from dapple.scene import traced
-from dapple.scene.sensors import POSITION, facing_of
+from dapple.scene.facing import facing_of
+from dapple.scene.sensors import POSITION
 from dapple.scene.surfaces import Scene, of_kinds
 from dapple.sky.open_sky import open_sky_par
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dapple.cloud import branches, eigenvalues
+from dapple.cloud.auto import chosen
 from dapple.cloud.classifiers import CLASSIFIERS
 from dapple.cloud.classify import classify, codes, majority
 from dapple.cloud.clean import thin
@@ -258,7 +259,7 @@ def test_every_classifier_classifies_and_is_scored(method):
     classified, facts = classify(a_scan_of(xyz_m, is_leaf), method, threshold_db=-6.0)
     kinds = classified.attributes["Classification"]
     assert set(np.unique(kinds)) <= {0, 4}
-    assert facts["method"] == method
+    assert facts["method"] == {"auto": "reflectance"}.get(method, method)
     assert facts["leaf_share"] == pytest.approx((kinds == 4).mean())
     assert facts["scores"]["leaf"]["f1"] > 0.6
     if CLASSIFIERS[method].needs:
@@ -276,5 +277,13 @@ def test_what_a_classifier_needs_and_lacks_is_named_with_the_file(method):
 
 
 def test_a_classifier_that_there_is_not_is_an_error_and_not_all_leaf():
-    with pytest.raises(InputError, match="found 'forest'; expected one of reflectance"):
+    with pytest.raises(InputError, match="found 'forest'; expected one of auto, reflectance"):
         classify(Cloud(np.ones((100, 3))), "forest")
+
+
+def test_auto_takes_reflectance_in_decibels_and_shape_without_it():
+    cloud = Cloud(np.zeros((4, 3)), attributes={"Reflectance": np.array([-9.0, -8.0, -3.0, -2.0])})
+    assert chosen(cloud) == "reflectance"
+    assert chosen(Cloud(np.zeros((4, 3)))) == "geometry"
+    for other in (np.full(4, -8.0), np.array([1e3, 2e3, 3e3, 4e3]), np.full(4, np.nan)):
+        assert chosen(Cloud(np.zeros((4, 3)), attributes={"Reflectance": other})) == "geometry"

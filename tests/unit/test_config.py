@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from dapple.config import checks, docs, study_checks
+from dapple.config import checks, docs, inferred, study_checks
 from dapple.config.settings import Settings, validate
 from dapple.errors import InputError, MissingMissesError
 
@@ -39,7 +39,7 @@ def test_what_is_made_from_the_typed_configuration_is_in_step_with_it(name):
 
 def test_the_default_file_says_what_the_types_say():
     default = yaml.safe_load((docs.CONFIG / "config.yaml").read_text())
-    assert validate(default) == validate({}) == Settings()
+    assert validate(default) == validate({})
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
@@ -253,7 +253,7 @@ CHECKS = {one.__name__: one for one in checks.CHECKS}
 @pytest.mark.parametrize("name", CONTRADICTIONS)
 def test_it_is_the_check_of_that_name_that_finds_them(name):
     for config, found in CONTRADICTIONS[name]:
-        settings = Settings.model_validate(config)
+        settings = inferred.resolved(Settings.model_validate(config))
         with pytest.raises(InputError) as error:
             CHECKS[name](settings, "mine.yaml")
         assert found in error.value.found
@@ -351,3 +351,24 @@ def test_a_switch_of_an_earlier_version_names_the_study():
 @pytest.mark.parametrize("name", ["Tree_7", "plot-utc+1", "v1.2"])
 def test_an_experiment_may_be_called_what_a_folder_may_be_called(name):
     assert validate({"experiment": name}).experiment == name
+
+
+def test_a_scan_that_keeps_its_shots_needs_no_key_beyond_its_path():
+    found = validate({"cloud": {"path": "scan.e57"}})
+    assert (found.source, found.measured.kind) == ("cloud", "none")
+    assert found.reconstructions == ("polygons", "surfels", "voxels_0.2", "voxels_1.0")
+
+
+@pytest.mark.parametrize(
+    ("config", "expected"),
+    [
+        ({}, ("virtual", "virtual", 5)),
+        ({"cloud": {"path": "tree.laz"}}, ("cloud", "none", 2)),
+        ({"cloud": {"path": "a.laz", "scan_positions": "p.csv"}}, ("cloud", "none", 4)),
+        ({"wood_path": "bark.obj"}, ("wood", "none", 3)),
+        ({"cloud": {"path": "a.laz"}, "measured": {"path": "p.csv"}}, ("cloud", "table", 2)),
+    ],
+)
+def test_files_tell_the_source_the_records_and_what_can_be_made_of_them(config, expected):
+    found = validate(config)
+    assert (found.source, found.measured.kind, len(found.reconstructions)) == expected

@@ -5,6 +5,7 @@ from dapple.errors import InputError
 from dapple.formats.ground_surface import GroundSurface, flat
 from dapple.formats.meshes import Mesh
 from dapple.scene import sensors
+from dapple.scene.facing import facing_of
 from dapple.scene.surfaces import of_kinds
 
 
@@ -73,7 +74,7 @@ def test_a_row_that_stands_there_twice_is_read_once_with_a_word(tmp_path, capsys
 
 def test_tilted_sensors_face_where_their_columns_say_and_level_ones_need_no_azimuth(tmp_path):
     text = "label,X,Y,Z,tilt_deg,azimuth_deg\na,1,2,3,0,\nb,1,2,3,90,90\nc,1,2,3,30,180\n"
-    found = sensors.facing_of(sensors.read(table(tmp_path, text)))
+    found = facing_of(sensors.read(table(tmp_path, text)))
     half = 0.5, np.sqrt(0.75)
     expected = np.array([[0, 0, 1], [1, 0, 0], [0, -half[0], half[1]]])
     assert found == pytest.approx(expected, abs=1e-12)
@@ -82,7 +83,7 @@ def test_tilted_sensors_face_where_their_columns_say_and_level_ones_need_no_azim
 def test_level_sensors_carry_no_angles(tmp_path):
     read = sensors.read(table(tmp_path, "label,X,Y,Z,tilt_deg\na,1,2,3,0\n"))
     assert list(read) == ["sensor", *sensors.POSITION]
-    assert sensors.facing_of(read) is None
+    assert facing_of(read) is None
 
 
 def test_angles_of_the_configuration_hold_where_the_table_has_none(tmp_path):

@@ -51,6 +51,7 @@ KEYS = {
     "site={timezone: UTC}": "series_figure",
     "time={end: 2023-08-10 16:30}": f"sky {SKY}",
     "sensors={height_m: 0.2}": f"sensors tree_figure {traced(5)}",
+    "sensors={tilt_deg: 30, azimuth_deg: 180}": f"sensors tree_figure {traced(5)}",
     # The map of the ground shows level light, whatever sensors read.
     "sensors={response: hemispherical}": traced(5),
     "measured={noise_relative: 0.03}": COMPARED,

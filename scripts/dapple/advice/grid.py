@@ -18,8 +18,9 @@ from dapple.light.light_model import Model, Tracing
 from dapple.light.timestep_series import Reference
 from dapple.light.tolerances import DIRECT_SHARE
 from dapple.scene import traced
+from dapple.scene.facing import facing_of
 from dapple.scene.scene_optics import Optics
-from dapple.scene.sensors import POSITION, facing_of
+from dapple.scene.sensors import POSITION
 from dapple.scene.surfaces import Scene
 from dapple.scene.traced import TracedScene
 from dapple.sky.open_sky import open_sky_par

@@ -42,7 +42,7 @@ def of(facts: CloudFacts, settings: dict[str, Any]) -> list[dict[str, Any]]:
             "Reflectance" in facts.cloud.attributes,
             "the points have reflectance"
             if "Reflectance" in facts.cloud.attributes
-            else "no reflectance: by shape, `classify: {method: geometry}`",
+            else "no reflectance: leaf and wood are told by shape",
         ),
         (
             "light",

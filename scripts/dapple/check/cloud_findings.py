@@ -9,12 +9,12 @@ import numpy as np
 from dapple import findings
 from dapple.check.cloud_facts import TALLEST_M, WIDEST_M, CloudFacts, is_a_plot
 from dapple.cloud import ground_finder, selection
+from dapple.cloud.auto import is_decibel
 from dapple.findings import Finding
 from dapple.formats.clouds import Cloud
 from dapple.structure import polygon_sizes
 
 LEAST_M = 0.3
-USUAL_DB = (-40.0, 20.0)
 MANY_DUPLICATES = 0.01
 ROUNDED_M = 0.004
 """Steps of coordinates from which on points fall on each other by themselves."""
@@ -175,9 +175,14 @@ def spacing(facts: CloudFacts, settings: dict, path: str | Path) -> Iterator[Fin
 def reflectance(facts: CloudFacts, settings: dict, path: str | Path) -> Iterator[Finding]:
     """Leaf and wood can be told by the attribute that is to tell them."""
     method = settings["classify"]["method"]
+    values = facts.cloud.attributes.get("Reflectance")
+    if method == "auto":
+        if values is None or not is_decibel(values):
+            yield findings.note(path, "no reflectance in dB: leaf and wood are told by shape")
+            return
+        method = "reflectance"
     if method not in ("reflectance", "mixture"):
         return
-    values = facts.cloud.attributes.get("Reflectance")
     geometry = "classify:\n  method: geometry"
     if values is None:
         there = ", ".join(sorted(facts.cloud.attributes)) or "none"
@@ -192,7 +197,7 @@ def reflectance(facts: CloudFacts, settings: dict, path: str | Path) -> Iterator
         )
         return
     known = facts.numbers["attributes"]["Reflectance"]
-    if not USUAL_DB[0] <= known["median"] <= USUAL_DB[1] or known["most"] - known["least"] == 0:
+    if not is_decibel(values):
         yield findings.error(
             path,
             f"Reflectance from {known['least']:g} to {known['most']:g}, median {known['median']:g}",

@@ -40,6 +40,12 @@ class Classifier:
     load: Callable[[], Method]
 
 
+def _as_it_can() -> Method:
+    from dapple.cloud.auto import as_it_can
+
+    return as_it_can
+
+
 def _fixed_threshold() -> Method:
     from dapple.cloud.reflectance import fixed_threshold
 
@@ -65,6 +71,7 @@ def _all_leaf() -> Method:
 
 
 CLASSIFIERS = {
+    "auto": Classifier("reflectance where points have it in dB, else geometry", (), _as_it_can),
     "reflectance": Classifier("fixed threshold", ("Reflectance",), _fixed_threshold),
     "mixture": Classifier("threshold from the data", ("Reflectance",), _own_threshold),
     "geometry": Classifier("the course of branches", (), _along_branches),

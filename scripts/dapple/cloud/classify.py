@@ -44,8 +44,8 @@ def classify(
     cloud : Cloud
         With `Classification`: 4 for leaf, 0 for wood.
     facts : dict
-        `method`, `points`, what the method tells, `leaf_share` and, where the cloud has a
-        `TrueClass`, its `scores`.
+        `method` (of auto the one that it took), `points`, what the method tells, `leaf_share` and,
+        where the cloud has a `TrueClass`, its `scores`.
 
     Raises
     ------

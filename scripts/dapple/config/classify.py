@@ -12,7 +12,8 @@ class Classify(Section):
     """Leaf or wood."""
 
     method: Annotated[str, OneOf(CLASSIFIERS)] = key(
-        "reflectance", ", ".join(f"{name}: {one.summary}" for name, one in CLASSIFIERS.items())
+        "auto",
+        ", ".join(f"{name}: {one.summary}" for name, one in CLASSIFIERS.items()),
     )
     threshold_db: float = key(-5.4, "reflectance above which a point is wood", FREY)
     majority_voxel_m: Positive = key(0.05, "voxels in which the majority decides", FREY)

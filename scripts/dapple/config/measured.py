@@ -12,8 +12,10 @@ SENSOR_MODEL = {"noise_relative", "noise_umol_m2_s", "calibration_relative", "cl
 class Measured(TimedTable):
     """The measured series."""
 
-    kind: Literal["virtual", "table", "none"] = key(
-        "virtual", "light of the virtual truth through a sensor model, a file, or none"
+    kind: Literal["auto", "virtual", "table", "none"] = key(
+        "auto",
+        "light of the virtual truth through a sensor model, a file, or none; auto: as the source "
+        "and path tell",
     )
     sensor_column: str = key("", "column of labels; empty: sensor or label, or logger and channel")
     par_column: str = key(

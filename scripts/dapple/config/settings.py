@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from annotated_types import Ge
 from pydantic import Field, ValidationError
 
-from dapple.config import checks, old_keys
+from dapple.config import checks, inferred, old_keys
 from dapple.config.advice import Advice
 from dapple.config.base import Section, Some, key
 from dapple.config.chlorophyll import Chlorophyll
@@ -56,11 +56,14 @@ class Settings(Section):
     )
     seed: Annotated[int, Ge(0)] = key(1, "every random number of the run derives from it")
     data_dir: str = key("../shared/data", "folder of real data; only real experiments read it")
-    source: Literal["virtual", "wood", "cloud"] = key(
-        "virtual", "a virtual tree and scan, real wood with virtual leaves, or a point cloud"
+    source: Literal["auto", "virtual", "wood", "cloud"] = key(
+        "auto",
+        "a virtual tree and scan, real wood with virtual leaves, or a point cloud; auto: as "
+        "cloud.path or wood_path tell",
     )
     reconstructions: Some[str] = key(
-        ("polygons", "surfels", "voxels_0.2", "voxels_1.0", "truth"), "what light is computed for"
+        ("polygons", "surfels", "voxels_0.2", "voxels_1.0", "truth"),
+        "what light is computed for; of this default those that the source has",
     )
     ground_z_m: float | None = key(
         None, "height of flat ground; none: found in the cloud, else 0 of the tree's frame"
@@ -120,8 +123,9 @@ def validate(config: dict[str, Any], where: str = "configuration") -> Settings:
         of its range, or values that contradict each other.
     """
     try:
-        settings = Settings.model_validate(old_keys.renewed(config, where))
+        written = Settings.model_validate(old_keys.renewed(config, where))
     except ValidationError as error:
         raise explain(error, Settings, where) from None
+    settings = inferred.resolved(written)
     checks.check(settings, where)
     return settings

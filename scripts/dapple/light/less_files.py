@@ -14,8 +14,9 @@ from dapple import frames
 from dapple.errors import InputError
 from dapple.formats import netcdf, tables
 from dapple.formats.meshes import Mesh
+from dapple.scene.facing import facing_of
 from dapple.scene.scene_optics import Optics
-from dapple.scene.sensors import POSITION, facing_of
+from dapple.scene.sensors import POSITION
 from dapple.scene.surfaces import Scene, turbid_grid
 from dapple.sky.sky_radiance import FLUXES, in_directions
 

@@ -12,9 +12,9 @@ from dapple.light.light_datasets import dataset
 from dapple.light.timestep import Rays, timestep
 from dapple.optics.responses import COSINE, Response
 from dapple.scene import mitsuba_scene
+from dapple.scene.facing import facing_of
 from dapple.scene.render_scene import RenderScene
 from dapple.scene.scene_optics import Optics, group_bands, group_flux
-from dapple.scene.sensors import facing_of
 from dapple.scene.surfaces import Scene
 from dapple.sky.sky_radiance import in_directions
 from dapple.streams import stream_seed

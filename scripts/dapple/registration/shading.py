@@ -12,7 +12,7 @@ from dapple.errors import InputError
 from dapple.light import rays_to_sky
 from dapple.optics.responses import Response
 from dapple.registration import fit
-from dapple.scene.sensors import facing_of
+from dapple.scene.facing import facing_of
 from dapple.scene.surfaces import Scene
 from dapple.sky.open_sky import open_beam, open_diffuse, towards_sun
 

@@ -12,7 +12,6 @@ from dapple.errors import InputError
 from dapple.formats import column_names, ground_surface, user_tables
 from dapple.formats.ground_surface import GroundSurface
 from dapple.formats.meshes import Mesh
-from dapple.frames import direction_from_angles
 from dapple.scene.surfaces import GROUND, Surface
 
 COLUMN_NAMES = {
@@ -169,13 +168,6 @@ def turned(
                 "set `sensors.tilt_deg` and `sensors.azimuth_deg` for all.",
             )
     return pd.concat([table, angles], axis=1)
-
-
-def facing_of(table: pd.DataFrame) -> np.ndarray | None:
-    """Unit normals (n, 3) of sensors, or None where all are level and look up."""
-    if "tilt_deg" not in table:
-        return None
-    return direction_from_angles(table["tilt_deg"].to_numpy(), table["azimuth_deg"].to_numpy())
 
 
 def on_ground(table: pd.DataFrame, ground: GroundSurface) -> pd.DataFrame:
