@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from dapple.cloud.classifiers import CLASSIFIERS
+from dapple.cloud.geometry import along_branches
+from dapple.cloud.reflectance import fixed_threshold
 from dapple.formats.clouds import Cloud
 
 USUAL_DB = (-40.0, 20.0)
@@ -20,7 +21,8 @@ def as_it_can(
     Parameters and returns are those of every classifier; `method` is among the facts.
     """
     method = chosen(cloud)
-    leaf, facts = CLASSIFIERS[method].load()(cloud, settings, seed)
+    told = along_branches if method == "geometry" else fixed_threshold
+    leaf, facts = told(cloud, settings, seed)
     return leaf, {**facts, "method": method}
 
 

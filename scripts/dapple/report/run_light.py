@@ -10,7 +10,7 @@ import yaml
 
 from dapple.formats import netcdf, tables
 from dapple.report.recommendation import KNOWN
-from dapple.sky.open_sky import level_beam, open_sky_par
+from dapple.sky.open_sky import open_beam, open_sky_par
 from dapple.timezones import find_timezone
 
 
@@ -58,7 +58,7 @@ class RunLight:
     @property
     def open_beam(self) -> np.ndarray:
         """(t,) PAR of the direct beam where no tree stands."""
-        return level_beam(self.sky)
+        return open_beam(self.sky)
 
     @property
     def open_sky(self) -> np.ndarray:
