@@ -5,8 +5,9 @@
 For polygons and voxels of a synthetic apple tree: the stated standard error and the scatter of
 light between seeds, root mean squares over sensors and times, as shares of the open sky's light,
 and the standard deviation and the largest of z, the deviations from the mean over all seeds divided
-by the stated errors, over sensors and times at which light differs between seeds: a place that is in
-full sun in every seed deviates by nothing. The deviation should be 1 (docs/data/light_errors.csv).
+by the stated errors, over sensors and times at which light differs between seeds: a place that is
+in full sun in every seed deviates by nothing. The deviation should be 1
+(docs/data/light_errors.csv).
 """
 
 import argparse

@@ -36,8 +36,8 @@ FIGURES = {
         "drawn_by": "daily_courses",
         "category": "Light",
         "caption": "Photosynthetically active radiation through the day: measured (black) and "
-        "simulated with each reconstruction (lines), at sensors from the darkest to the "
-        "brightest.",
+        "simulated with each reconstruction (lines; band: where 90 % of records are expected "
+        "under the first), at sensors from the darkest to the brightest.",
         "inputs": {
             "light": [results(f"light/{name}.nc") for name in LIT],
             "records": results("statistics/records.csv") if COMPARED else [],

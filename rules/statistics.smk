@@ -3,7 +3,8 @@ Statistics: how well simulated light matches measured light, and what it cost.
 
 Needs   light/{reconstruction}.nc and the records, or the virtual truth
 Makes   statistics/records.json       what was read of the records, and what was noticed
-        statistics/records.csv        measured and simulated PAR side by side, fitting and reporting part named
+        statistics/records.csv        measured and simulated PAR side by side, between which bounds 90 % of
+                                      records are expected, fitting and reporting part named
         statistics/overall.csv        one line a reconstruction, reporting part only
         statistics/per_sensor.csv     one line a sensor
         statistics/agreement.csv      engines of light against each other
@@ -24,6 +25,7 @@ rule records:
         sensors=results("sky/sensors.csv"),
         sky=results("sky/sky.nc"),
         registration=FITTED,
+        errors=beside_code("stats/reconstruction_errors.csv"),
         code=code("records"),
     output:
         records=results("statistics/records.csv"),
@@ -41,6 +43,8 @@ rule records:
         kind=settings.measured.kind,
         table=settings.measured.table(),
         sensor_model=settings.measured.sensor_model(),
+        sensor_error=settings.measured.sensor_error(),
+        leaves_by_chance=settings.source == "wood",
         response=RESPONSE,
         reconstructions=COMPARED,
         seed=stream("records"),

@@ -7,9 +7,10 @@ from dapple import findings
 from dapple.formats import json, netcdf, tables
 from dapple.scene.facing import facing_of
 from dapple.sky.open_sky import open_sky_par
-from dapple.stats import measured, plausible_records
+from dapple.stats import measured, plausible_records, predictive
 from dapple.stats.measured import Records
 from dapple.stats.pairs import pair
+from dapple.stats.predictive import SensorError
 from dapple.virtual.sensor_model import simulate
 from dapple.workflow import run
 
@@ -43,6 +44,13 @@ def main(snakemake):
     fitted = table["sensor"].isin(registration.get("fitting_sensors", []))
     if until := registration.get("fitting_until"):
         fitted |= table["time"] <= pd.Timestamp(until)
+    bounds = predictive.interval(
+        table,
+        tables.read(inputs.errors),
+        SensorError(**params.sensor_error),
+        leaves_by_chance=params.leaves_by_chance,
+    )
+    table = table.join(bounds)
     table["part"] = np.where(fitted, "fitting", "reporting")
     tables.write(snakemake.output.records, table, "%.3f")
     noticed = [*records.findings, *plausible_records.check(table, records.table)]

@@ -68,6 +68,12 @@ def test_the_table_has_the_columns_that_others_rely_on():
     assert table.loc[0, ["engine", "reference"]].tolist() == ["transport", "less"]
 
 
+def test_engines_that_trace_with_mitsuba_are_said_to_share_its_ray_tracer():
+    pairs = [("transport", "timestep"), ("transport", "less"), ("timestep", "less")]
+    table = agreement.table([{"engine": one, "reference": other} for one, other in pairs])
+    assert table["shared"].str.contains("ray tracer").tolist() == [True, False, False]
+
+
 def test_an_error_is_relative_to_the_open_sky_of_its_own_time_and_the_night_does_not_count():
     open_sky = np.array([1000.0, 100.0, 0.0])
     reference = np.zeros((2, 3))

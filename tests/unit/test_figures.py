@@ -248,6 +248,15 @@ def test_without_records_the_simulations_are_drawn_alone():
     assert "measured" not in labels
 
 
+def test_the_predictive_interval_is_that_of_the_first_reconstruction():
+    data = records()
+    data = data.assign(low=data["simulated"] - 50, high=data["simulated"] + 150)
+    band = daily_courses.draw(data, ["1_1"], timezone="UTC").axes[0].collections[0]
+    first = data[(data["reconstruction"] == data["reconstruction"][0]) & (data["sensor"] == "1_1")]
+    low, high = band.get_paths()[0].vertices[:, 1].min(), band.get_paths()[0].vertices[:, 1].max()
+    assert (low, high) == pytest.approx((first["low"].min(), first["high"].max()))
+
+
 def test_an_unknown_sensor_is_named():
     with pytest.raises(InputError, match="found 9_9; expected labels such as 1_1"):
         daily_courses.draw(records(), ["1_1", "9_9"], timezone="UTC")

@@ -90,6 +90,7 @@ CODE = {
     "registration/fit.py": "",  # nothing is fitted
     "stats/correlation.R": f"record_statistics {FIGURES}",
     "stats/agreement.py": "agreement",
+    "stats/reconstruction_errors.csv": COMPARED,
     "verdict/verdict_model.json": "verdict",
     "figures/tree.py": "tree_figure",
     "figures/scatter.py": "scatter_figure",

@@ -36,3 +36,10 @@ class Measured(TimedTable):
     def sensor_model(self) -> dict[str, Any]:
         """Options of `virtual.sensor_model.simulate`, without the seed."""
         return self.model_dump(include=SENSOR_MODEL)
+
+    def sensor_error(self) -> dict[str, float]:
+        """Options of `stats.predictive.SensorError`: of the sensor model, or its defaults."""
+        if self.kind != "virtual":
+            return {}
+        model = self.model_dump(include=SENSOR_MODEL - {"clock_offset_s"})
+        return model | {"radiation_relative": 0.0}

@@ -86,7 +86,8 @@ def draw(
     ----------
     records : DataFrame
         `reconstruction, sensor, time` (UTC), `simulated` and, where there are records, `measured`
-        [µmol m⁻² s⁻¹]; where components are drawn also `direct`, the simulated direct beam.
+        [µmol m⁻² s⁻¹]; where components are drawn also `direct`, the simulated direct beam; with
+        `low` and `high` the predictive interval of the first reconstruction is drawn.
     sensors : sequence of str
         Sensors to draw, one panel each, in this order.
     timezone : str
@@ -133,6 +134,10 @@ def _panel(axes: Axes, own: pd.DataFrame, names: tuple[str, ...], components_of:
     if "measured" in own:
         measured = _line(own, own["reconstruction"].iloc[0], "measured")
         axes.plot(*measured, color=style.COLOURS["measured"], lw=1.6, alpha=0.9, label="measured")
+    if "low" in own:
+        band = _line(own, names[0], "low", "high")
+        text = f"90 % of records, {style.label(names[0])}"
+        axes.fill_between(*band, color=style.colour(names[0], names), alpha=0.15, lw=0, label=text)
     for name in names:
         line = _line(own, name, "simulated")
         axes.plot(*line, color=style.colour(name, names), lw=1.1, label=style.label(name))

@@ -14,7 +14,8 @@ PARTS = {
     "par_direct_umol_m2_s": "PAR straight from the sun",
     "par_sky_umol_m2_s": "PAR straight from the sky",
     "par_scattered_umol_m2_s": "PAR scattered by leaves, bark and ground",
-    "standard_error_umol_m2_s": "standard error of PAR",
+    "standard_error_umol_m2_s": "standard error of simulated PAR, by rays and placements of leaves "
+    "alone: not its distance from the truth",
 }
 
 

@@ -70,6 +70,9 @@ QUANTITIES = {
     ),
     "engine": Quantity("engine"),
     "reference": Quantity("reference"),
+    "shared": Quantity(
+        "shared", meaning="What both engines have in common, whose faults agreement cannot show."
+    ),
     "leaf_area_m2": Quantity("leaf area", "m²", "One-sided area of all leaves."),
     "true_leaf_area_m2": Quantity("true leaf area", "m²", "Of the virtual plant."),
     "wood_area_m2": Quantity("wood area", "m²", "Surface of stem and branches."),

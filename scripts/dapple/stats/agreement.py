@@ -7,7 +7,9 @@ import xarray as xr
 from dapple.errors import InputError
 
 FACTS = ["n", "rmse_rel", "bias_rel", "max_abs_z"]
-COLUMNS = ["reconstruction", *FACTS, "engine", "reference"]
+COLUMNS = ["reconstruction", *FACTS, "engine", "reference", "shared"]
+INPUT = "scene, sun and sky, spectra, sensors"
+"""What all engines are given: agreement says nothing for it."""
 PAR, ERROR = "par_umol_m2_s", "standard_error_umol_m2_s"
 
 
@@ -87,5 +89,12 @@ def rmse_rel(par: np.ndarray, reference: np.ndarray, open_sky: np.ndarray) -> fl
 
 
 def table(rows: list[dict[str, str | float]]) -> pd.DataFrame:
-    """A row for each reconstruction and pair of engines, from what `compare` returned for it."""
-    return pd.DataFrame(rows, columns=COLUMNS)
+    """A row for each reconstruction and pair of engines, from what `compare` returned for it.
+
+    `shared` tells what both engines have in common, whose faults their agreement cannot show.
+    """
+    found = pd.DataFrame(rows, columns=COLUMNS)
+    # LESS traces with Embree; the two engines that trace with Mitsuba share its ray tracer.
+    independent = (found[["engine", "reference"]] == "less").any(axis=1)
+    found["shared"] = np.where(independent, INPUT, f"{INPUT}, ray tracer (Mitsuba)")
+    return found
