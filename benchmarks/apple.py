@@ -1,14 +1,16 @@
 """The published apple tree on ten random halves of its sensors, each with its own fit.
 
-    python benchmarks/apple.py [--folder results/apple] [--docs docs]
+    python benchmarks/apple.py [--folder results/apple] [--docs docs] [--halves-alone] [--step 5]
 
 Needs a finished run of config/apple.yaml. For every half of the sensors the shift of the tree and
 the gain of the site are fitted on that half alone; the other half reports.
 
 docs/data/apple_choices.csv: how leaves are placed, their sway, the gain and the interval of a
 record, compared with direct light and an even sky on a grid of shifts; what fits the fitting halves
-best is what config/apple.yaml takes. docs/data/apple_halves.csv: the whole model of that
-configuration on each half. docs/data/apple_clock.csv: the clock offset that fits each half best.
+best is what config/apple.yaml takes. docs/data/apple_clock.csv: the clock offset that fits each
+half best. docs/data/apple_halves.csv: the whole model of that configuration on each half, with
+--halves-alone nothing else, with --step on records so many minutes apart;
+docs/data/apple_halves_summary.csv: mean and range over the halves.
 """
 
 import argparse
@@ -85,12 +87,16 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, default=Path("results/apple"))
     parser.add_argument("--placements", type=int, default=8)
     parser.add_argument("--docs", type=Path, default=Path(__file__).parents[1] / "docs")
+    parser.add_argument("--halves-alone", action="store_true")
+    parser.add_argument("--step", type=float, default=1.0, help="minutes between times")
     options = parser.parse_args()
-    run = Run(options.folder)
-    choices, clocks = compare(run, options.placements)
-    for name, table in {
-        "apple_choices": choices, "apple_clock": clocks, "apple_halves": whole_model(run)
-    }.items():  # fmt: skip
+    run = Run(options.folder, options.step)
+    found = {}
+    if not options.halves_alone:
+        found["apple_choices"], found["apple_clock"] = compare(run, options.placements)
+    found["apple_halves"] = whole_model(run)
+    found["apple_halves_summary"] = summary(found["apple_halves"])
+    for name, table in found.items():
         table.to_csv(options.docs / "data" / f"{name}.csv", index=False, float_format="%.5g")
         print(table.to_string(index=False, float_format=lambda value: f"{value:.4g}"), flush=True)
 
@@ -230,6 +236,14 @@ def whole_model(run: Run) -> pd.DataFrame:
             )  # fmt: skip
             print(rows[-1], flush=True)
     return pd.DataFrame(rows)
+
+
+def summary(by_half: pd.DataFrame) -> pd.DataFrame:
+    """Mean, least and most of r, RMSE and bias on the sensors that did not fit, over all halves."""
+    parts = by_half.groupby("reconstruction", sort=False)[["n", "r", "rmse", "bias", "gain"]]
+    columns = {end: getattr(parts, end)() for end in ("mean", "min", "max")}
+    named = [table.add_suffix(f"_{end}") for end, table in columns.items()]
+    return pd.concat([parts.size().rename("halves"), *named], axis=1).reset_index()
 
 
 if __name__ == "__main__":

@@ -47,15 +47,24 @@ def test_every_model_and_mask_is_held_against_simulated_pixels_and_field_trees(c
     assert table[["rmse", "rrmse"]].notna().all(axis=None)
 
 
-def test_the_map_lies_where_the_images_do_and_holds_possible_values(chlorophyll):
+def test_the_map_lies_where_the_images_do_and_follows_the_true_leaves(chlorophyll):
+    """Cells of 3 m against the chlorophyll of the crowns in them, weighted by area."""
     mapped = rasters.read(chlorophyll.result("chlorophyll/map.tif"))
     seen = rasters.read(chlorophyll.result("plots/larch/world/images.tif"))
     assert mapped.crs == seen.crs
     assert mapped.left_m == pytest.approx(seen.left_m)
     assert mapped.top_m == pytest.approx(seen.top_m)
-    values = mapped.values[0][np.isfinite(mapped.values[0])]
-    assert len(values) >= 10
-    assert ((values >= 10) & (values <= 70)).all()
+    y, x = (axis.ravel() for axis in np.meshgrid(*mapped.centres_m(), indexing="ij"))
+    cells = geopandas.GeoSeries(geopandas.points_from_xy(x, y)).buffer(1.5, cap_style="square")
+    crowns = geopandas.read_file(chlorophyll.result("plots/larch/world/crowns.geojson"))
+    area = np.array([crowns.intersection(cell).area for cell in cells])
+    with np.errstate(invalid="ignore"):
+        true = area @ crowns["lcc_ug_cm2"].to_numpy() / area.sum(axis=1)
+    found = mapped.values[0].ravel()
+    known = np.isfinite(found) & np.isfinite(true)
+    assert known.sum() >= 10
+    assert np.corrcoef(found[known], true[known])[0, 1] > 0.4
+    assert abs(np.mean(found[known] - true[known])) < 5
 
 
 def test_collision_orders_meet_direct_renders_within_the_noise_of_both(chlorophyll):
