@@ -125,12 +125,12 @@ def test_the_published_tree_can_be_planned_from_its_own_records(tmp_path):
 
 def images_over(lidar, path, pixel_m=0.25):
     """Five bands and alpha above a cloud: bright crowns, dark soil, shade to the north."""
-    cloud = laspy.read(lidar)
-    low, high = (np.array(corner)[:2] for corner in (cloud.header.mins, cloud.header.maxs))
-    columns, rows = np.ceil((high - low) / pixel_m).astype(int)
-    column, row = (np.column_stack([cloud.x - low[0], high[1] - cloud.y]) / pixel_m).astype(int).T
-    top = np.full((rows, columns), cloud.header.mins[2])
-    np.maximum.at(top, (row.clip(0, rows - 1), column.clip(0, columns - 1)), cloud.z)
+    x, y, z = np.array(laspy.read(lidar).xyz).T
+    left, upper = x.min(), y.max()
+    column, row = ((x - left) / pixel_m).astype(int), ((upper - y) / pixel_m).astype(int)
+    rows, columns = row.max() + 1, column.max() + 1
+    top = np.full((rows, columns), z.min())
+    np.maximum.at(top, (row, column), z)
     height = top - ndimage.minimum_filter(top, 41)
     shaded = height < np.roll(height, -6, axis=0) - 3.0  # the sun stands in the south
     noise = np.random.default_rng(1).lognormal(0.0, 0.1, height.shape)
@@ -141,7 +141,7 @@ def images_over(lidar, path, pixel_m=0.25):
     values = np.stack([*(1e4 * band for band in bands), np.full(height.shape, 65_535)])
     with rasterio.open(
         path, "w", dtype="uint16", crs="EPSG:26912", count=6, width=columns, height=rows,
-        transform=from_origin(low[0], high[1], pixel_m, pixel_m),
+        transform=from_origin(left, upper, pixel_m, pixel_m),
     ) as file:  # fmt: skip
         file.write(values.clip(0, 65_535).astype(np.uint16))
         file.descriptions = [*crown, ""]
