@@ -152,6 +152,13 @@ def test_each_reconstruction_keeps_its_colour_and_no_two_share_one():
     assert style.colour("a", ("a", "b")) != style.colour("b", ("a", "b"))
 
 
+def test_names_are_written_as_a_person_would():
+    labels = [
+        style.label(name) for name in ("voxels_0.2", "voxels_0.2_corrected", "virtual_leaves")
+    ]
+    assert labels == ["voxels 0.2 m", "voxels 0.2 m corrected", "virtual leaves"]
+
+
 def test_a_painted_triangle_covers_its_area():
     corners = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]])
     image = painter.render(corners, np.ones((1, 3)), np.zeros(2), np.ones(2), width_px=100)

@@ -3,6 +3,7 @@
 import json
 import re
 
+import numpy as np
 import pandas as pd
 import pytest
 import yaml
@@ -74,9 +75,8 @@ def test_the_first_sentence_says_which_reconstruction_to_use_and_the_next_which_
 def test_the_best_of_several_sound_ones_is_named_and_the_others_too():
     verdict = judged(polygons="green", surfels="green")
     verdict["reconstructions"]["surfels"]["expected_loss"] = 0.05
-    said = sentences(verdict, None)[0]
-    assert said.startswith("Use surfels")
-    assert said.endswith("Polygons can be used as well.")
+    assert sentences(verdict, None)[0].startswith("Use surfels")
+    assert sentences(verdict, None)[1].startswith("Polygons can be used as well")
 
 
 def test_nothing_is_recommended_where_all_are_red():
@@ -97,14 +97,23 @@ def test_what_is_not_known_is_the_reason_where_no_signal_raised_the_alarm():
     assert "Polygons are doubtful: nobody knows." in sentences(verdict, None)
 
 
-def test_records_choose_among_what_a_user_can_choose_and_say_where_the_verdict_doubts():
-    verdict = judged(polygons="amber", voxels_1="green")
-    said = sentences(verdict, overall(truth=1.0, polygons=100.0, voxels_1=300.0))[-1]
-    assert "90 records" in said
-    assert "polygons come nearest: r = 0.90, RMSE 100 and bias −20" in said
-    assert "their scan speaks against them" in said
-    said = sentences(verdict, overall(surfels=100.0))[-1]
-    assert "not known" in said
+def test_records_choose_among_what_may_be_used_and_the_scan_says_what_it_has_against_it():
+    verdict = judged(polygons="amber", voxels_1="green", surfels="red")
+    first, *others = sentences(verdict, overall(truth=1, surfels=50, polygons=100, voxels_1=300))
+    assert first.startswith("Use polygons: of all, their light comes nearest to 90 records (r = ")
+    assert "RMSE 100, bias −20" in first
+    assert "Away from these sensors take care: 66" in first
+    assert others[0].startswith("Voxels of 1 m can be used as well")
+    assert others[1].startswith("Do not use surfels")
+    assert len(others) == 2
+
+
+def test_what_is_best_by_records_and_was_not_judged_is_said_to_be_so():
+    first = sentences(judged(voxels_1="green"), overall(surfels=100.0, voxels_1=200.0))[0]
+    assert first.startswith("Use surfels")
+    assert "not known yet" in first
+    first = sentences(judged(voxels_1="green"), overall(voxels_1=200.0))[0]
+    assert first.endswith("and nothing in the scan speaks against them.")
 
 
 def test_the_page_opens_with_the_sentence_and_never_calls_a_run_sound_while_one_is_red(tmp_path):
@@ -175,6 +184,13 @@ def test_numbers_have_three_digits_that_count(value, text):
     assert number(value) == text
 
 
+def test_whole_numbers_are_counts_and_units_are_read_from_names():
+    shown = table(pd.DataFrame({"n": [36, 3600], "reach_m": [0.5, 1.0]}), "x")
+    assert [row[0].text for row in shown.rows] == ["36", "3\u2009600"]
+    assert [row[1].text for row in shown.rows] == ["0.500", "1.00"]
+    assert (shown.columns[1].label, shown.columns[1].unit) == ("reach", "m")
+
+
 def test_what_is_missing_is_a_dash_and_sorted_below_all_numbers():
     shown = table(pd.DataFrame({"r": [0.5, float("nan")]}), "x")
     assert [row[0].text for row in shown.rows] == ["0.500", "–"]
@@ -204,3 +220,29 @@ def test_every_reference_is_an_entry_that_bibtex_can_read():
         entry = reference.bibtex(key)
         assert entry.count("{") == entry.count("}")
         assert str(reference.year) in reference.cited()
+
+
+# Other studies
+
+
+def test_studies_without_a_verdict_open_with_what_they_found(tmp_path):
+    shadowing = pd.DataFrame(
+        {"design": ["single", "diamond"] * 2, "n_beams": [1, 1, 9, 9], "rs": [0.9, 0.9, 0.8, 0.5]}
+    )
+    page = written(tmp_path / "survey", {"survey/shadowing.csv": shadowing})
+    assert (
+        "diamond hides least of the filled voxels: 50 % with the finest scans, single 80 %" in page
+    )
+    thresholds = pd.DataFrame(
+        {"stressor": ["noise", "noise", "gap"], "level": [2.0, np.nan, 1.0],
+         "reconstruction": ["polygons", "surfels", "polygons"]}
+    )  # fmt: skip
+    page = written(tmp_path / "stability", {"stability/thresholds.csv": thresholds})
+    assert "Of 2 kinds of trouble" in page
+    assert "surfels 0, polygons 2" in page
+    accuracy = pd.DataFrame(
+        {"plot": "larch", "model": ["semi_less", "prosail"], "test_set": "field", "n": 12,
+         "seed": "ensemble", "rmse": [4.0, 8.0]}
+    )  # fmt: skip
+    page = written(tmp_path / "plot", {"chlorophyll/accuracy.csv": accuracy})
+    assert "nearest to 12 trees comes semi less with an RMSE of 4.00" in page

@@ -242,3 +242,11 @@ def test_the_models_that_come_along_keep_what_was_promised_on_unseen_runs():
     rates = json.loads(judgement.MODEL.read_text())["records"]["rates"]["halves"]
     assert rates["detection"] >= 0.85
     assert rates["false_alarms"] <= 0.15
+
+
+def test_a_signal_that_is_a_logarithm_is_told_as_the_factor_that_it_is():
+    signal = SIGNALS["area_polygons_to_fine"]
+    assert signal.tell(np.log(0.46)) == "polygons have 0.46 times the leaf area of the voxels"
+    assert signal.number(0.0) == "1.00"
+    assert SIGNALS["sparse_polygons"].number(0.27) == "27%"
+    assert SIGNALS["reflectance_valley"].number(0.0) == ""

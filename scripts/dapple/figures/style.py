@@ -88,7 +88,8 @@ def colour(reconstruction: str, others: tuple[str, ...] = ()) -> str:
 def label(reconstruction: str) -> str:
     """A reconstruction's name as a person would write it."""
     if reconstruction.startswith("voxels_"):
-        return f"voxels {reconstruction.removeprefix('voxels_')} m"
+        size, _, kind = reconstruction.removeprefix("voxels_").partition("_")
+        return f"voxels {size} m {kind.replace('_', ' ')}".strip()
     return reconstruction.replace("_", " ")
 
 

@@ -147,18 +147,25 @@ def table(
         Columns that mean something else in this table than in others.
     """
     columns = [also.get(str(name)) or quantity(str(name)) for name in frame]
+    counts = [_is_count(frame[name]) for name in frame]
     rows = [
         [
-            cell(value, about.digits, named if name in NAMES else str)
-            for name, value, about in zip(frame, row, columns, strict=True)
+            cell(value, 0 if is_count else about.digits, named if name in NAMES else str)
+            for name, value, about, is_count in zip(frame, row, columns, counts, strict=True)
         ]
         for row in frame.itertuples(index=False, name=None)
     ]
     return Table(title, columns, rows, note)
 
 
+def _is_count(column: pd.Series) -> bool:
+    """Whether a column holds whole numbers alone, as counts do."""
+    numbers = pd.to_numeric(column, errors="coerce").dropna()
+    return bool(len(numbers)) and bool((numbers % 1 == 0).all())
+
+
 def cell(value: Any, digits: int = 3, named: Callable[[str], str] = str) -> Cell:
-    """A value as text, numbers with so many significant digits."""
+    """A value as text, numbers with so many significant digits; none: whole numbers."""
     if isinstance(value, bool) or str(value) in ("True", "False"):
         return Cell("yes" if str(value) == "True" else "no", str(value))
     if isinstance(value, str):
@@ -170,6 +177,8 @@ def cell(value: Any, digits: int = 3, named: Callable[[str], str] = str) -> Cell
 
 def number(value: float, digits: int = 3) -> str:
     """A number with so many significant digits, all those before the point, a true minus sign."""
+    if digits == 0:
+        return f"{value:,.0f}".replace(",", "\u2009").replace("-", "−")
     if value == 0:
         return "0"
     magnitude = int(f"{value:.{digits - 1}e}".split("e")[1])

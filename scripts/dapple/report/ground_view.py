@@ -34,7 +34,8 @@ def blocks(run: RunLight, folder: Path) -> Iterator[Block]:
     yield Chart(
         "ground",
         "ground",
-        "PAR on the ground. Move the slider: sun, shade and flecks of light move with the hour, "
-        "here and in the view of the tree. Circles are sensors; the sun stands at the edge.",
+        "PAR on the ground below the polygons. Move the slider: sun, shade and flecks of light "
+        "move with the hour, here and in the view of the tree. Circles are sensors; the sun stands "
+        "at the edge.",
         data,
     )

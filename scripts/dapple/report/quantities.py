@@ -168,6 +168,16 @@ REFLECTANCE = {name: Quantity(name) for name in ("rmse", "bias", "mean", "max")}
 """The same in tables of simulated images."""
 
 
+UNITS = {
+    "_m2_m3": "m² m⁻³", "_umol_m2_s": PAR_UNIT, "_ug_cm2": "µg cm⁻²", "_m3": "m³", "_m2": "m²",
+    "_m": "m", "_deg": "°", "_s": "s", "_mb": "MB", "_rel": "relative",
+}  # fmt: skip
+"""Units by the end of a column's name."""
+
+
 def quantity(name: str) -> Quantity:
-    """How a column is shown; one that has no entry, by its name."""
-    return QUANTITIES.get(name) or Quantity(name.replace("_", " "))
+    """How a column is shown; one that has no entry, by its name and the unit in it."""
+    if name in QUANTITIES:
+        return QUANTITIES[name]
+    ending = next((end for end in UNITS if name.endswith(end)), "")
+    return Quantity(name.removesuffix(ending).replace("_", " "), UNITS.get(ending, ""))

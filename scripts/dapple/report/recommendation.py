@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from string import Formatter
 from typing import Any
 
 import pandas as pd
@@ -40,24 +39,51 @@ def sentences(verdict: Mapping[str, Any], overall: pd.DataFrame | None) -> list[
         )
         for state in SAYS
     }
+    nearest = _nearest(overall, states["red"])
+    first = [_by_records(nearest, verdict)] if nearest is not None else _by_scan(states, judged)
+    named = "" if nearest is None else str(nearest["reconstruction"])
     return [
-        *_use(states, judged),
+        *first,
+        *_others([name for name in states["green"] if name != named] if named else []),
         *(
             f"{_capital(called(name))} are doubtful: {_why(judged[name], verdict)}."
             for name in states["amber"]
+            if name != named
         ),
         *(f"Do not use {called(name)}: {_why(judged[name], verdict)}." for name in states["red"]),
-        *_by_records(overall, states),
+        *(["There are no records of light to hold this against."] if overall is None else []),
     ]
 
 
-def _use(states: Mapping[str, Sequence[str]], judged: Mapping[str, Any]) -> list[str]:
+def _nearest(overall: pd.DataFrame | None, red: Sequence[str]) -> pd.Series | None:
+    """The row of the reconstruction that is nearest to records, of those that may be used."""
+    if overall is None:
+        return None
+    own = overall[~overall["reconstruction"].isin([KNOWN, *red])].dropna(subset="rmse")
+    return None if own.empty else own.loc[own["rmse"].idxmin()]
+
+
+def _by_records(row: pd.Series, verdict: Mapping[str, Any]) -> str:
+    """What records, which no fit has seen, recommend, and what the scan says to it."""
+    name = str(row["reconstruction"])
+    r = "" if pd.isna(row["r"]) else f"r = {row['r']:.2f}, "
+    text = _typeset(
+        f"Use {called(name)}: of all, their light comes nearest to {row['n']:.0f} records ({r}RMSE "
+        f"{number(row['rmse'])}, bias {row['bias']:+.0f} {PAR_UNIT})"
+    )
+    facts = verdict["reconstructions"].get(name)
+    if facts is None:
+        return f"{text}. What speaks against them in a scan is not known yet."
+    if facts["state"] == "amber":
+        return f"{text}. Away from these sensors take care: {_why(facts, verdict)}."
+    return f"{text}, and nothing in the scan speaks against them."
+
+
+def _by_scan(states: Mapping[str, Sequence[str]], judged: Mapping[str, Any]) -> list[str]:
+    """What the scan alone recommends."""
     if states["green"]:
         best, *others = states["green"]
-        text = f"Use {called(best)}: nothing in this run speaks against them."
-        if others:
-            text += f" {_capital(_and(others))} can be used as well."
-        return [text]
+        return [f"Use {called(best)}: nothing in this run speaks against them.", *_others(others)]
     if states["amber"]:
         return [f"Use {called(states['amber'][0])} with care: no reconstruction is beyond doubt."]
     if judged:
@@ -65,25 +91,11 @@ def _use(states: Mapping[str, Sequence[str]], judged: Mapping[str, Any]) -> list
     return ["No reconstruction of this run was judged."]
 
 
-def _by_records(overall: pd.DataFrame | None, states: Mapping[str, Sequence[str]]) -> list[str]:
-    """What records say, and whether that is what the verdict says."""
-    if overall is None:
-        return ["There are no records of light to hold this against."]
-    own = overall[overall["reconstruction"] != KNOWN].dropna(subset="rmse")
-    if own.empty:
+def _others(names: Sequence[str]) -> list[str]:
+    """What can be used beside the best."""
+    if not names:
         return []
-    best = own.loc[own["rmse"].idxmin()]
-    r = "" if pd.isna(best["r"]) else f"r = {best['r']:.2f}, "
-    text = (
-        f"Of {best['n']:.0f} records each, {called(best['reconstruction'])} come nearest: {r}"
-        f"RMSE {number(best['rmse'])} and bias {best['bias']:+.0f} {PAR_UNIT}"
-    ).replace("-", "−")
-    name = best["reconstruction"]
-    if name in (*states["amber"], *states["red"]):
-        text += ", although their scan speaks against them: trust them at these sensors only"
-    elif name not in states["green"]:
-        text += "; what speaks against them in a scan is not known yet"
-    return [text + "."]
+    return [f"{_capital(_and(names))} can be used as well: nothing speaks against them."]
 
 
 def blocks(verdict: Mapping[str, Any]) -> list[Block]:
@@ -124,9 +136,7 @@ def _why(facts: Mapping[str, Any], verdict: Mapping[str, Any]) -> str:
 def _reason(reason: Mapping[str, Any]) -> str:
     """What was seen, and what it is in an undisturbed run."""
     text = str(reason["text"])
-    fields = [one for one in Formatter().parse(SIGNALS[reason["signal"]].text) if one[1]]
-    if fields:
-        usual = format(float(reason["usual"]), fields[0][2] or "")
+    if usual := SIGNALS[reason["signal"]].number(float(reason["usual"])):
         text += f" (undisturbed: {usual})"
     beyond = ", more than in any run that was tried" if reason["is_beyond"] else ""
     return _typeset(f"{text}{beyond}")

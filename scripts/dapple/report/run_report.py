@@ -15,16 +15,11 @@ from dapple.report import (
     residuals,
     run_light,
     sensor_view,
+    study_leads,
     tree_view,
 )
 from dapple.report.blocks import Block, Section, picture
 from dapple.report.document import document
-
-LEADS = {
-    "survey": "What designs of a scan see of a stand and what they miss.",
-    "stability": "How far each reconstruction can be trusted when a scan gets worse.",
-    "chlorophyll": "Leaf chlorophyll from images and a laser scan of the canopy.",
-}
 
 
 def build(experiment: str, folder: Path, captions: Mapping[str, str]) -> str:
@@ -47,7 +42,7 @@ def build(experiment: str, folder: Path, captions: Mapping[str, str]) -> str:
     """
     verdict = json.read(path) if (path := folder / "verdict.json").is_file() else None
     overall = numbers.overall(folder)
-    lead = recommendation.sentences(verdict, overall) if verdict else _lead(folder)
+    lead = recommendation.sentences(verdict, overall) if verdict else study_leads.sentences(folder)
     captions = {**captions, **_captions_of_plots(folder)}
     made = [name for name in captions if (folder / name).is_file()]
     tables = [*numbers.COMPARED, *numbers.OF_STUDIES, "verdict.json", "runtime.csv"]
@@ -77,10 +72,6 @@ def _tree(folder: Path, run: run_light.RunLight | None) -> Iterator[Block]:
     """The tree of a run, lit or not."""
     names = list(run.light) if run else sorted(p.name for p in folder.glob("structure/*"))
     return tree_view.blocks(folder, names, run.best if run else "")
-
-
-def _lead(folder: Path) -> list[str]:
-    return [text for study, text in LEADS.items() if (folder / study).is_dir()]
 
 
 def _captions_of_plots(folder: Path) -> dict[str, str]:

@@ -1,6 +1,8 @@
 """What each signal means, which way it gets worse, and what would help."""
 
+import math
 from dataclasses import dataclass
+from string import Formatter
 
 
 @dataclass(frozen=True)
@@ -12,7 +14,7 @@ class Signal:
     worse : int
         1 where more is worse, -1 where less is, 0 where it should be as in an undisturbed run.
     text : str
-        What it tells, `{value}` standing for the number.
+        What it tells, `{value}` standing for the number, `{factor}` for e to the power of it.
     help : str
         What would help.
     is_log : bool
@@ -23,6 +25,20 @@ class Signal:
     text: str
     help: str
     is_log: bool = False
+
+    def tell(self, value: float) -> str:
+        """What a value of the signal says, in words."""
+        return self.text.format(**_said(value))
+
+    def number(self, value: float) -> str:
+        """The number alone, as it stands in the words; nothing where they have none."""
+        fields = (one for one in Formatter().parse(self.text) if one[1])
+        return next((format(_said(value)[name], spec or "") for _, name, spec, _ in fields), "")
+
+
+def _said(value: float) -> dict[str, float]:
+    """A value as words may need it."""
+    return {"value": value, "factor": math.exp(min(value, 700.0))}
 
 
 MORE_SCANS = "Scan from more positions, spread evenly around the tree; `survey_next` proposes them."
@@ -89,10 +105,10 @@ SIGNALS = {
         1, "polygons lack {value:.0%} of their area where beams seldom came", OCCLUDED
     ),
     "area_polygons_to_fine": Signal(
-        0, "polygons have exp({value:+.2f}) times the leaf area of the voxels", DISAGREEMENT
+        0, "polygons have {factor:.2f} times the leaf area of the voxels", DISAGREEMENT
     ),
     "area_fine_to_coarse": Signal(
-        0, "small voxels have exp({value:+.2f}) times the leaf area of large ones", COARSER
+        0, "small voxels have {factor:.2f} times the leaf area of large ones", COARSER
     ),
     "capped_share": Signal(
         1,
