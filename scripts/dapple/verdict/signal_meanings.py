@@ -32,8 +32,9 @@ class Signal:
 
     def number(self, value: float) -> str:
         """The number alone, as it stands in the words; nothing where they have none."""
-        fields = (one for one in Formatter().parse(self.text) if one[1])
-        return next((format(_said(value)[name], spec or "") for _, name, spec, _ in fields), "")
+        said = _said(value)
+        fields = [(name, spec or "") for _, name, spec, _ in Formatter().parse(self.text) if name]
+        return next((format(said[name], spec) for name, spec in fields), "")
 
 
 def _said(value: float) -> dict[str, float]:
