@@ -2,7 +2,8 @@
 
     python benchmarks/page_tables.py RUN [--results results]
 
-RUN is an experiment whose results lie in RESULTS; what the pages show of it is written to
+RUN is an experiment whose results lie in RESULTS, or `verdicts` for those of all real trees, or
+`scaling` for what follows from docs/data/scaling.csv; what the pages show of it is written to
 docs/data. `docs/data/README.md` lists the tables.
 """
 
@@ -67,11 +68,38 @@ def apple(folder: Path) -> dict[str, pd.DataFrame]:
     return {"apple": agreement_with_truth(folder)}
 
 
+def verdicts(folder: Path) -> dict[str, pd.DataFrame]:
+    """What is said of the runs of real trees whose results lie beside this folder."""
+    rows = []
+    for run in REAL_RUNS:
+        found = json.loads((folder.parent / run / "verdict.json").read_text())
+        unknown = "; ".join(one["text"] for one in found["unknown"])
+        for name, own in found["reconstructions"].items():
+            row = {"run": run, "verdict": found["state"], "reconstruction": name}
+            row |= {"own_verdict": own["state"]}
+            row |= {key: own[key] for key in ("expected_loss", "alarm")}
+            row |= {"why": "; ".join(reason["text"] for reason in own["reasons"][:2])}
+            rows.append(row | {"unknown": unknown})
+    return {"real_verdicts": pd.DataFrame(rows)}
+
+
+def scaling(folder: Path) -> dict[str, pd.DataFrame]:
+    """Processor time at the largest number of triangles over that at the smallest."""
+    table = pd.read_csv(DATA / "scaling.csv")
+    own = table[table["axis"] == "triangles"].sort_values("value")
+    parts = ("direct", "paths")
+    ratio = [own[f"{part}_cpu_s"].iloc[-1] / own[f"{part}_cpu_s"].iloc[0] for part in parts]
+    return {"scaling_growth": pd.DataFrame({"part": list(parts), "times_as_long": ratio})}
+
+
+REAL_RUNS = ("apple", "leafy-tree", "single-scan", "pine-plot")
 RUNS: dict[str, Callable[[Path], dict[str, pd.DataFrame]]] = {
     "survey-small": survey_small,
     "virtual-apple": virtual_apple,
     "apple": apple,
     "stability": stability_tables.tables,
+    "verdicts": verdicts,
+    "scaling": scaling,
 }
 
 

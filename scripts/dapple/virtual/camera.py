@@ -1,6 +1,6 @@
 """Images of a virtual plot from above, by Mitsuba's own path tracer: every material its own colour.
 
-Nothing is shared with the simulated images that chlorophyll is retrieved with, but Mitsuba's rays:
+The simulated images that chlorophyll is retrieved with are made otherwise, but for Mitsuba's rays:
 leaves are strips of needles and not facets, every tree has its own optics, the ground is patchy,
 paths have no largest order, and light is traced band by band in Mitsuba's integrator.
 """
