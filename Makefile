@@ -2,12 +2,17 @@
 CORES ?= 2
 BIN := .venv/bin
 
-.PHONY: run test setup lint format docs site lock coverage hooks
+.PHONY: run test test-all setup lint format docs site lock coverage hooks
 
 run: setup
 	$(BIN)/snakemake --cores $(CORES)
 
 test: setup lint
+	@tools/browser
+	$(BIN)/python -m pytest -q -n $(CORES) --dist loadfile -m "not long"
+
+# Besides, what takes minutes each or needs a cluster.
+test-all: setup lint
 	@tools/browser
 	$(BIN)/python -m pytest -q -n $(CORES) --dist loadfile
 
@@ -45,4 +50,4 @@ site: setup
 	$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
 
 lock: setup
-	$(BIN)/uv pip compile pyproject.toml --group dev --generate-hashes --universal --no-header --quiet -o requirements.lock
+	$(BIN)/uv pip compile pyproject.toml --extra cluster --group dev --generate-hashes --universal --no-header --quiet -o requirements.lock

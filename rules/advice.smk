@@ -36,7 +36,7 @@ if settings.source != "wood":
             "../envs/dapple.yaml"
         threads: 2
         resources:
-            mem_mb=2000,
+            mem_mb=memory(2000),
         params:
             **settings.polygons.model_dump(exclude={"voxel_size_m"}),
             voxel_size_m=lambda wildcards: float(wildcards.size),
@@ -68,7 +68,7 @@ if LIT:
             "../envs/dapple.yaml"
         threads: 2
         resources:
-            mem_mb=4000,
+            mem_mb=memory(4000),
         params:
             **settings.advice.model_dump(exclude={"paths"}),
             **PILOT,
@@ -104,7 +104,7 @@ if LIT:
             "../envs/dapple.yaml"
         threads: 2
         resources:
-            mem_mb=4000,
+            mem_mb=memory(4000),
         params:
             **settings.tradeoff.model_dump(exclude={"max_orders"}),
             **PILOT,
@@ -135,7 +135,7 @@ if LIT:
             "../envs/dapple.yaml"
         threads: 1
         resources:
-            mem_mb=1000,
+            mem_mb=memory(1000),
         params:
             experiment=settings.experiment,
         message:

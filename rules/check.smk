@@ -31,7 +31,7 @@ rule inspect_input:
         "../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=4000,
+        mem_mb=memory(4000),
     params:
         **settings.model_dump(
             include={
@@ -63,7 +63,7 @@ rule check:
         "../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=500,
+        mem_mb=memory(500),
     message:
         said("what was found in the input")
     script:

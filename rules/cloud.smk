@@ -23,7 +23,7 @@ rule clean:
         "../envs/cloud.yaml"
     threads: 2
     resources:
-        mem_mb=4000,
+        mem_mb=memory(4000),
     params:
         **settings.clean.model_dump(exclude={"distance_points"}),
         ground_z_m=GROUND_Z_M,
@@ -50,7 +50,7 @@ rule classify:
         "../envs/dapple.yaml"
     threads: 2
     resources:
-        mem_mb=4000,
+        mem_mb=memory(4000),
     params:
         **dict(settings.classify),
         seed=stream("classify"),

@@ -110,6 +110,11 @@ def said(text):
     return f"{settings.experiment}: {text}"
 
 
+def memory(mb):
+    """Memory that a rule asks for: half as much again at each further attempt, where there are any."""
+    return lambda wildcards, attempt: mb * (attempt + 1) // 2
+
+
 def code(script, unused=()):
     """The modules that a script is made of: an edit reruns the rule.
 

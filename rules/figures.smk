@@ -151,7 +151,7 @@ for figure, about in FIGURES.items():
             "../envs/dapple.yaml"
         threads: 1
         resources:
-            mem_mb=2000,
+            mem_mb=memory(2000),
         params:
             drawn_by=about["drawn_by"],
             options=about.get("options", {}),
@@ -176,7 +176,7 @@ rule page:
         "../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=memory(2000),
     params:
         experiment=settings.experiment,
         captions={about["path"]: about["caption"] for about in FIGURES.values()}

@@ -34,7 +34,7 @@ rule timesteps:
         "../envs/dapple.yaml"
     threads: 2
     resources:
-        mem_mb=4000,
+        mem_mb=memory(4000),
     params:
         engine=REFERENCE,
         ground_z_m=GROUND_Z_M,
@@ -71,7 +71,7 @@ rule reference:
         "../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=memory(1000),
     message:
         said("series of the timesteps, {wildcards.reconstruction}")
     script:
@@ -99,7 +99,7 @@ rule less_timesteps:
         "../envs/less.yaml"
     threads: 2
     resources:
-        mem_mb=4000,
+        mem_mb=memory(4000),
     params:
         engine={"bands": LESS.bands, "aperture_m": OF_BEAM["aperture_m"]},
         rays=LESS_RAYS,
@@ -140,7 +140,7 @@ rule export_scene:
         "../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=memory(2000),
     params:
         rays=LESS_RAYS,
         aperture_m=OF_BEAM["aperture_m"],
@@ -171,7 +171,7 @@ rule less:
         "../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=memory(1000),
     message:
         said("series of LESS, {wildcards.reconstruction}")
     script:
@@ -199,7 +199,7 @@ if settings.light.engine == "transport":
             "../envs/dapple.yaml"
         threads: 2
         resources:
-            mem_mb=4000,
+            mem_mb=memory(4000),
         params:
             model=tracing("sky_patches", "max_orders"),
             tracing=tracing(
@@ -242,7 +242,7 @@ if settings.light.engine == "transport":
             "../envs/dapple.yaml"
         threads: 2
         resources:
-            mem_mb=4000,
+            mem_mb=memory(4000),
         params:
             tracing=tracing(
                 "tolerance",
@@ -281,7 +281,7 @@ rule ground_map:
         "../envs/dapple.yaml"
     threads: 2
     resources:
-        mem_mb=4000,
+        mem_mb=memory(4000),
     params:
         times=settings.figures.map_times,
         timezone=settings.time.timezone,

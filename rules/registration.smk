@@ -32,7 +32,7 @@ if settings.registration.fit:
             "../envs/dapple.yaml"
         threads: 2
         resources:
-            mem_mb=4000,
+            mem_mb=memory(4000),
         params:
             **settings.registration.model_dump(exclude={"fit"}),
             **SKY,

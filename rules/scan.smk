@@ -25,7 +25,7 @@ rule configuration:
         "../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=200,
+        mem_mb=memory(200),
     params:
         settings=settings.model_dump(mode="json"),
     message:
@@ -51,7 +51,7 @@ if settings.source == "virtual":
             "../envs/dapple.yaml"
         threads: 1
         resources:
-            mem_mb=2000,
+            mem_mb=memory(2000),
         params:
             **dict(settings.plant),
             seed=stream("plant"),
@@ -77,7 +77,7 @@ if settings.source == "wood":
             "../envs/dapple.yaml"
         threads: 1
         resources:
-            mem_mb=500,
+            mem_mb=memory(500),
         message:
             said("wood polygons of {input.obj}")
         script:
@@ -97,7 +97,7 @@ if settings.source == "wood":
             "../envs/dapple.yaml"
         threads: 1
         resources:
-            mem_mb=2000,
+            mem_mb=memory(2000),
         params:
             **settings.leaves.model_dump(exclude={"placements"}),
             seed=lambda wildcards: stream("virtual_leaves", wildcards.placement),
@@ -121,7 +121,7 @@ if settings.source == "wood":
             "../envs/dapple.yaml"
         threads: 1
         resources:
-            mem_mb=1000,
+            mem_mb=memory(1000),
         message:
             said("areas of the real wood and its virtual leaves")
         script:
@@ -152,7 +152,7 @@ if settings.source == "cloud":
             "../envs/dapple.yaml"
         threads: 1
         resources:
-            mem_mb=4000,
+            mem_mb=memory(4000),
         params:
             unit=settings.cloud.unit,
             up=settings.cloud.up,
@@ -179,7 +179,7 @@ if settings.source == "cloud":
             "../envs/dapple.yaml"
         threads: 1
         resources:
-            mem_mb=4000,
+            mem_mb=memory(4000),
         params:
             ground_z_m=settings.ground_z_m,
         message:
@@ -207,7 +207,7 @@ if settings.source == "cloud":
                 "../envs/dapple.yaml"
             threads: 2
             resources:
-                mem_mb=4000,
+                mem_mb=memory(4000),
             params:
                 **dict(settings.tree),
                 buffer_m=settings.polygons.buffer_m,
@@ -237,7 +237,7 @@ else:
             "../envs/dapple.yaml"
         threads: 2
         resources:
-            mem_mb=4000,
+            mem_mb=memory(4000),
         params:
             **dict(settings.scan),
             seed=stream("scan"),

@@ -29,7 +29,7 @@ rule sky:
         "../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=memory(1000),
     params:
         **SKY,
         time=dict(settings.time),
@@ -63,7 +63,7 @@ rule optics:
         "../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=500,
+        mem_mb=memory(500),
     params:
         **OPTICS,
     message:
@@ -89,7 +89,7 @@ rule sensors:
         "../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=memory(1000),
     params:
         kind=settings.sensors.kind,
         table=settings.sensors.table(),

@@ -38,7 +38,7 @@ rule records:
         "../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=memory(1000),
     params:
         kind=settings.measured.kind,
         table=settings.measured.table(),
@@ -74,7 +74,7 @@ rule record_statistics:
         "../envs/statistics.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=memory(1000),
     params:
         **dict(settings.statistics),
         seed=stream("statistics"),
@@ -107,7 +107,7 @@ rule agreement:
         "../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=500,
+        mem_mb=memory(500),
     params:
         reconstructions=CHECKED,
         engines=["transport", *CHECK_WITH],
@@ -136,7 +136,7 @@ rule runtime:
         "../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=500,
+        mem_mb=memory(500),
     params:
         reconstructions=settings.reconstructions,
     message:

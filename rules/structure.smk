@@ -42,7 +42,7 @@ if settings.source != "wood":
             "../envs/dapple.yaml"
         threads: 2
         resources:
-            mem_mb=2000,
+            mem_mb=memory(2000),
         params:
             **dict(settings.polygons),
             correction=(
@@ -79,7 +79,7 @@ if settings.source != "wood":
             "../envs/dapple.yaml"
         threads: 2
         resources:
-            mem_mb=4000,
+            mem_mb=memory(4000),
         params:
             **SURFELS,
             seed=stream("surfels"),
@@ -104,7 +104,7 @@ if settings.source != "wood":
             "../envs/cloud.yaml"
         threads: 1
         resources:
-            mem_mb=4000,
+            mem_mb=memory(4000),
         params:
             cloudcompare=settings.tools.cloudcompare,
             max_points=settings.clean.distance_points,
@@ -133,7 +133,7 @@ rule export_obj:
         "../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=memory(1000),
     message:
         said("{wildcards.meshed} in the axes of {wildcards.axes}")
     script:
@@ -163,7 +163,7 @@ rule voxels:
         "../envs/dapple.yaml"
     threads: 2
     resources:
-        mem_mb=2000,
+        mem_mb=memory(2000),
     params:
         **settings.voxels.model_dump(exclude={"sizes_m"}),
         correction=clumping_correction,
@@ -211,7 +211,7 @@ rule voxels_summary:
         "../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=memory(1000),
     message:
         said("areas in {wildcards.size} m voxels")
     script:

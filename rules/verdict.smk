@@ -40,7 +40,7 @@ rule verdict:
         "../envs/dapple.yaml"
     threads: 2
     resources:
-        mem_mb=4000,
+        mem_mb=memory(4000),
     params:
         reconstructions=JUDGED,
         polygons=(

@@ -31,7 +31,7 @@ rule plot_ground:
         "../../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=4000,
+        mem_mb=memory(4000),
     params:
         crs=CROWNS.crs,
         noise=CROWN_NOISE,
@@ -65,7 +65,7 @@ rule plot_crowns:
         "../../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=memory(1000),
     params:
         crowns={
             "min_height_m": CROWNS.min_height_m,
@@ -104,7 +104,7 @@ rule plot_scene:
         "../../envs/dapple.yaml"
     threads: 2
     resources:
-        mem_mb=6000,
+        mem_mb=memory(6000),
     params:
         noise=CROWN_NOISE,
         n_layers=CROWNS.layers,

@@ -32,7 +32,7 @@ rule image_coefficients:
         "../../envs/dapple.yaml"
     threads: 2
     resources:
-        mem_mb=3000,
+        mem_mb=memory(3000),
     params:
         pixel_m=IMAGES.pixel_m,
         paths_per_pixel=IMAGES.paths_per_pixel,
@@ -64,7 +64,7 @@ rule image_semiless:
         "../../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=memory(2000),
     params:
         levels=IMAGES.absorption_levels,
         structure=IMAGES.leaf_structure,
@@ -102,7 +102,7 @@ rule image_comparison:
         "../../envs/dapple.yaml"
     threads: 2
     resources:
-        mem_mb=3000,
+        mem_mb=memory(3000),
     params:
         bands=BANDS,
         leaves_and_soils=leaves_and_soils,
@@ -137,7 +137,7 @@ rule image_speed:
         "../../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=500,
+        mem_mb=memory(500),
     params:
         plots=CHLOROPHYLL.plots,
     message:

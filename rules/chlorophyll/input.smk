@@ -25,7 +25,7 @@ rule own_images:
         "../../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=6000,
+        mem_mb=memory(6000),
     params:
         crs=CROWNS.crs,
         bands=BANDS,
@@ -52,7 +52,7 @@ rule own_crowns:
         "../../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=memory(1000),
     params:
         tree_column=CHLOROPHYLL.user.crowns_tree_column,
         lcc_column=CHLOROPHYLL.user.crowns_lcc_column,
@@ -81,7 +81,7 @@ rule plot_light:
         "../../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=memory(1000),
     params:
         stated=plot_light,
         bands=BANDS,

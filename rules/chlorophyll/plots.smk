@@ -29,7 +29,7 @@ rule plot_world:
         "../../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=1500,
+        mem_mb=memory(1500),
     params:
         species=lambda wildcards: plot_of(wildcards).species,
         sizes=lambda wildcards: plot_of(wildcards).model_dump(include=SIZES),
@@ -71,7 +71,7 @@ rule plot_lidar:
         "../../envs/dapple.yaml"
     threads: 2
     resources:
-        mem_mb=6000,
+        mem_mb=memory(6000),
     params:
         flight=WORLD_FLIGHT,
         crs=WORLD.crs,
@@ -104,7 +104,7 @@ rule uav_images:
         "../../envs/dapple.yaml"
     threads: 2
     resources:
-        mem_mb=5000,
+        mem_mb=memory(5000),
     params:
         size_m=lambda wildcards: plot_of(wildcards).size_m,
         pixel_m=lambda wildcards: plot_of(wildcards).pixel_m,

@@ -34,7 +34,7 @@ rule observed_cells:
         "../../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=memory(2000),
     params:
         **SELECTION,
         bands=BANDS,
@@ -65,7 +65,7 @@ rule training_set:
         "../../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=4000,
+        mem_mb=memory(4000),
     params:
         bands=BANDS,
         leaves_and_soils=leaves_and_soils,
@@ -102,7 +102,7 @@ rule network:
         "../../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=memory(2000),
     params:
         bands=CAMERA.names,
         seeds=RETRIEVAL.seeds,
@@ -136,7 +136,7 @@ rule lcc_map:
         "../../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=memory(2000),
     params:
         taught=lambda wildcards: taught_by(wildcards.model),
         bands=CAMERA.names,
@@ -172,7 +172,7 @@ rule accuracy:
         "../../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=memory(2000),
     params:
         plot="{plot}",
         taught=lambda wildcards: taught_by(wildcards.model),
@@ -207,7 +207,7 @@ rule accuracy_table:
         "../../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=500,
+        mem_mb=memory(500),
     message:
         said("accuracy of all models")
     script:
@@ -248,7 +248,7 @@ rule chlorophyll_figures:
         "../../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=1500,
+        mem_mb=memory(1500),
     params:
         taught=TAUGHT,
         bands=BANDS,
@@ -282,7 +282,7 @@ rule plot_page:
         "../../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=500,
+        mem_mb=memory(500),
     params:
         plot="{plot}",
         bands=CAMERA.names,

@@ -80,9 +80,9 @@ def stability_base(wildcards):
     }
 
 
-def stability_memory(wildcards):
+def stability_memory(wildcards, attempt):
     """Memory of a batch [MB]."""
-    return STABILITY_LARGE.get(wildcards.stressor, 3000)
+    return memory(STABILITY_LARGE.get(wildcards.stressor, 3000))(wildcards, attempt)
 
 
 def stability_batches():

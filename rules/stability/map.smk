@@ -27,7 +27,7 @@ rule stability_points:
         "../../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=500,
+        mem_mb=memory(500),
     message:
         said("all runs in one table")
     script:
@@ -53,7 +53,7 @@ rule stability_figures:
         "../../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=memory(1000),
     message:
         said("map and curves")
     script:
@@ -75,7 +75,7 @@ rule stability_verdict:
         "../../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=500,
+        mem_mb=memory(500),
     message:
         said("which signals go with failures")
     script:

@@ -33,7 +33,7 @@ if WORSENED:
             "../../envs/stability.yaml"
         threads: 2
         resources:
-            mem_mb=4000,
+            mem_mb=memory(4000),
         params:
             reconstructions=WORSENED,
             levels=STABILITY.levels,

@@ -27,7 +27,7 @@ rule stability_base:
         "../../envs/stability.yaml"
     threads: 1
     resources:
-        mem_mb=3000,
+        mem_mb=memory(3000),
     params:
         setup=stability_setup(),
         reconstructions=STABILITY_RECONSTRUCTIONS,

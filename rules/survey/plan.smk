@@ -25,7 +25,7 @@ rule survey_plan:
         "../../envs/dapple.yaml"
     threads: 2
     resources:
-        mem_mb=2000,
+        mem_mb=memory(2000),
     params:
         truths=STANDS,
         volume_m=SURVEY.volume_m,
@@ -52,7 +52,7 @@ rule survey_next:
         "../../envs/dapple.yaml"
     threads: 2
     resources:
-        mem_mb=2000,
+        mem_mb=memory(2000),
     params:
         along=SURVEY.candidates,
         scans=SURVEY.plan_scans,
@@ -84,7 +84,7 @@ rule survey_coverage:
         "../../envs/dapple.yaml"
     threads: 2
     resources:
-        mem_mb=4000,
+        mem_mb=memory(4000),
     params:
         voxel_size_m=SURVEY.voxel_size_m,
         cell_size_m=SURVEY.cell_size_m,

@@ -26,7 +26,7 @@ rule survey_stand:
         "../../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=memory(2000),
     params:
         positions_m=lambda wildcards: stand_settings(wildcards)["positions_m"],
         size_m=lambda wildcards: stand_settings(wildcards)["size_m"],
@@ -58,7 +58,7 @@ rule survey_scan:
         "../../envs/dapple.yaml"
     threads: 2
     resources:
-        mem_mb=3000,
+        mem_mb=memory(3000),
     params:
         stand=stand_settings,
         scanner=SURVEY.scanner,
@@ -90,7 +90,7 @@ rule survey_candidates:
         "../../envs/dapple.yaml"
     threads: 2
     resources:
-        mem_mb=3000,
+        mem_mb=memory(3000),
     params:
         stand=stand_settings,
         scanner=SURVEY.scanner,
@@ -117,7 +117,7 @@ rule survey_variants:
         "../../envs/dapple.yaml"
     threads: 2
     resources:
-        mem_mb=3000,
+        mem_mb=memory(3000),
     params:
         stands={stand: grown(stand, 1) for stand in SURVEY.stands},
         scanner=SURVEY.scanner | {"azimuth_steps_deg": (0.5, 0.1, 0.02)},

@@ -25,7 +25,7 @@ rule survey_shadowing:
         "../../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=memory(2000),
     params:
         truths=STANDS,
         runs=SCANS,
@@ -56,7 +56,7 @@ rule survey_correction:
         "../../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=memory(2000),
     params:
         truths=STANDS,
         runs=SCANS,
@@ -94,7 +94,7 @@ rule survey_figures:
         "../../envs/dapple.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=memory(1000),
     params:
         cell_size_m=SURVEY.cell_size_m,
     message:

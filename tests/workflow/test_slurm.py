@@ -1,0 +1,115 @@
+"""A whole run on a real Slurm of one node; jobs that are cancelled, fail or lack memory."""
+
+import os
+import re
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+import yaml
+from tests.workflow import slurm
+from tests.workflow.project import ROOT, SMALL, copy_of_project
+
+PROFILE = yaml.safe_load((ROOT / "profiles/slurm/config.v9+.yaml").read_text())
+ARGUMENTS = ("--profile", "profiles/slurm", "--nocolor", "--configfile", SMALL)
+ONE_NODE = ("--cores", "2", "--default-resources", "slurm_partition=debug", "mem_mb=1000")
+LITTLE = ("--config", "reconstructions=[polygons]", "light={check: false}", "measured={kind: none}")
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    if lacking := slurm.lacking():
+        pytest.skip(lacking)
+    with slurm.cluster(tmp_path / "slurm") as environment:
+        yield environment
+
+
+def started(folder, environment, *more):
+    command = [sys.executable, "-m", "snakemake", *ARGUMENTS, *ONE_NODE, *more, *LITTLE]
+    return subprocess.Popen(
+        command,
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+def jobs(said):
+    return re.findall(r"submitted with SLURM jobid (\d+)", said)
+
+
+def test_every_step_of_a_run_belongs_to_a_group_of_jobs():
+    listed = subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "snakemake",
+            "--cores",
+            "1",
+            "--dry-run",
+            "--quiet",
+            "rules",
+            "--forceall",
+        ],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    rules = set(re.findall(r"^(\w+) +\d+$", listed.stdout + listed.stderr, re.MULTILINE))
+    assert rules - set(PROFILE["groups"]) - {"all", "total"} == set()
+
+
+@pytest.mark.long
+def test_a_run_is_at_most_eight_jobs(cluster, tmp_path):
+    folder = copy_of_project(tmp_path / "dapple").folder
+    said, _ = started(folder, cluster).communicate(timeout=1200)
+    assert "(100%) done" in said, said[-4000:]
+    assert (folder / "results/virtual-apple-small/report.html").is_file()
+    assert len(jobs(said)) <= 8
+
+
+@pytest.mark.long
+def test_a_job_that_is_cancelled_is_reported_and_run_again(cluster, tmp_path):
+    folder = copy_of_project(tmp_path / "dapple").folder
+    run = started(folder, cluster, "results/virtual-apple-small/classes/cloud.laz")
+    cancel = threading.Thread(target=_cancel_first, args=(cluster,))
+    cancel.start()
+    said, _ = run.communicate(timeout=1200)
+    cancel.join()
+    assert "CANCELLED" in said
+    assert len(jobs(said)) == 2
+    assert "(100%) done" in said, said[-4000:]
+
+
+def _cancel_first(environment):
+    for _ in range(300):
+        running = subprocess.run(
+            ["squeue", "-h", "-t", "R", "-o", "%A"], env=environment, capture_output=True, text=True
+        ).stdout.split()
+        if running:
+            subprocess.run(["scancel", running[0]], env=environment, check=True)
+            return
+        time.sleep(0.5)
+
+
+@pytest.mark.long
+def test_a_submission_that_fails_is_reported_and_made_again(cluster, tmp_path):
+    folder = copy_of_project(tmp_path / "dapple").folder
+    broken = tmp_path / "bin/sbatch"
+    broken.parent.mkdir()
+    real = subprocess.run(["which", "sbatch"], capture_output=True, text=True).stdout.strip()
+    broken.write_text(
+        f'#!/bin/sh\n[ -e {tmp_path}/once ] && exec {real} "$@"\n'
+        f"touch {tmp_path}/once\necho 'sbatch: error: the controller does not answer' >&2\nexit 1\n"
+    )
+    broken.chmod(0o755)
+    environment = cluster | {"PATH": f"{broken.parent}{os.pathsep}{cluster['PATH']}"}
+    run = started(folder, environment, "results/virtual-apple-small/classes/cloud.laz")
+    said, _ = run.communicate(timeout=1200)
+    assert "the controller does not answer" in said
+    assert "(100%) done" in said, said[-4000:]
