@@ -35,6 +35,7 @@ include: "rules/stability/common.smk"
 include: "rules/stability/runs.smk"
 include: "rules/stability/map.smk"
 include: "rules/stability/records.smk"
+include: "rules/provenance.smk"
 
 
 rule all:

@@ -133,6 +133,9 @@ REPORT_TEMPLATES = [
     for file in sorted((SCRIPTS / "dapple/report/templates").iterdir())
 ]
 
+# What rules of this run read of data_dir.
+DATA_FILES = []
+
 
 def data(path):
     """A file of real data, which the configuration names relative to data_dir."""
@@ -142,7 +145,8 @@ def data(path):
             f"dapple: {file}: found no such file; expected the data that `{settings.experiment}` "
             "reads. Set data_dir in the configuration to the folder that has it."
         )
-    return local(str(file))
+    DATA_FILES.append(local(str(file)))
+    return DATA_FILES[-1]
 
 
 def data_files(path):
@@ -155,7 +159,8 @@ def data_files(path):
             f"dapple: {settings.data_dir}: found no file like {path}; expected at least one. "
             "Correct the pattern or data_dir."
         )
-    return [local(str(file)) for file in found]
+    DATA_FILES.extend(local(str(file)) for file in found)
+    return DATA_FILES[-len(found) :]
 
 
 def sky_table():

@@ -142,20 +142,19 @@ def _uses(statement: ast.stmt, source: Source) -> set[Use]:
     return found
 
 
-def _within(
-    node: ast.AST, parameters: frozenset[str] = frozenset()
-) -> Iterator[tuple[ast.AST, frozenset[str]]]:
+def _within(top: ast.AST) -> Iterator[tuple[ast.AST, frozenset[str]]]:
     """A node and all below it, each with the parameters that hide names of the module there."""
-    yield node, parameters
-    if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
-        own = {arg.arg for arg in ast.walk(node.args) if isinstance(arg, ast.arg)}
-        body = node.body if isinstance(node.body, list) else [node.body]
-        for part in ast.iter_child_nodes(node):
-            hidden = parameters | own if part in body else parameters
-            yield from _within(part, hidden)
-    else:
-        for part in ast.iter_child_nodes(node):
-            yield from _within(part, parameters)
+    waiting: list[tuple[ast.AST, frozenset[str]]] = [(top, frozenset())]
+    while waiting:
+        node, hidden = waiting.pop()
+        yield node, hidden
+        parts = list(ast.iter_child_nodes(node))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            own = hidden | {arg.arg for arg in ast.walk(node.args) if isinstance(arg, ast.arg)}
+            body = node.body if isinstance(node.body, list) else [node.body]
+            waiting += [(part, own if part in body else hidden) for part in parts]
+        else:
+            waiting += [(part, hidden) for part in parts]
 
 
 def _imported(node: ast.Import | ast.ImportFrom) -> dict[str, tuple[Path, str | None]]:
