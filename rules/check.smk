@@ -4,7 +4,8 @@ Check: what the input holds, what is wrong with it, and what can be made of it, 
 Needs   the files that the configuration names
 Makes   check.json, check.html   facts and findings, each with the lines of YAML that mend it
 
-`snakemake check` prints them on one page; a run begins with the same look and stops at errors.
+`snakemake check` prints them on one page. A run begins with the same look and stops at errors, in
+`rule ingest`: were check.json its input, each edit that changes the look would read the cloud anew.
 """
 
 INPUT = {

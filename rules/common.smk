@@ -111,7 +111,7 @@ def said(text):
 
 
 def memory(mb):
-    """Memory that a rule asks for: half as much again at each further attempt, where there are any."""
+    """Memory of a job, and half as much again at each further attempt."""
     return lambda wildcards, attempt: mb * (attempt + 1) // 2
 
 
@@ -133,7 +133,7 @@ REPORT_TEMPLATES = [
     for file in sorted((SCRIPTS / "dapple/report/templates").iterdir())
 ]
 
-# What rules of this run read of data_dir.
+# What this run reads of data_dir.
 DATA_FILES = []
 
 

@@ -138,8 +138,7 @@ if settings.source == "cloud":
                 if settings.cloud.scan_positions
                 else []
             ),
-            check=ancient(results("check.json")),
-            code=code("ingest"),
+            code=code("ingest", unused=("check.inspection", "config.settings")),
         output:
             points=results("scan/points.laz"),
             frame=results("scan/frame.json"),

@@ -1,12 +1,17 @@
 """Read a real point cloud, and its shots where misses are recorded or can be rebuilt."""
 
+from pathlib import Path
+
+from dapple.check import inspection
 from dapple.cloud import selection, shot_sources
+from dapple.config.settings import validate
 from dapple.formats import clouds, json, shots
 from dapple.workflow import run
 
 
 def main(snakemake):
     params, path = snakemake.params, snakemake.input.cloud
+    _look_at_all_input(snakemake)
     cloud, source = selection.take(
         *clouds.read_with_source(path), path, unit=params.unit, up=params.up
     )
@@ -30,6 +35,22 @@ def main(snakemake):
         pieces = _pieces(fired, facts)
         shots.write_chunks(snakemake.output.shots, pieces, facts, moving=moving)
         print(facts)
+
+
+def _look_at_all_input(snakemake):
+    """Stop at what is wrong in any file of the run, before its first long job.
+
+    The configuration is no parameter of the rule: an edit of what the points do not depend on
+    leaves them as they are.
+    """
+    settings = validate(snakemake.config, "configuration")
+    sensors = settings.sensors.path if settings.sensors.kind == "table" else ""
+    inspection.stop_at_errors(
+        settings.model_dump(mode="json"),
+        cloud=snakemake.input.cloud,
+        positions=snakemake.input.positions,
+        sensors=Path(settings.data_dir) / sensors if sensors else "",
+    )
 
 
 def _pieces(fired, facts):

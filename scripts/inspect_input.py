@@ -1,9 +1,7 @@
 """Look at all input before anything is computed."""
 
-from dapple import findings
 from dapple.check import page
 from dapple.check.inspection import inspect
-from dapple.findings import Finding
 from dapple.formats import json
 from dapple.formats.atomic import atomic
 from dapple.workflow import options, run
@@ -16,7 +14,6 @@ def main(snakemake):
     json.write(snakemake.output.json, check)
     with atomic(snakemake.output.html) as partial:
         partial.write_text(page.page(json.read(snakemake.output.json)))
-    findings.say(Finding(**row) for row in check["findings"] if row["level"] == "warning")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,5 @@
 """What Snakemake's rules and scripts need: code dependencies, logs, and errors that read well."""
 
-import json
 import resource
 import sys
 import traceback
@@ -9,10 +8,8 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
-from dapple import findings
 from dapple.code_use import files_of
 from dapple.errors import InputError
-from dapple.findings import Finding
 
 
 def code_of(script: Path, unused: Sequence[str] = ()) -> tuple[str, ...]:
@@ -41,7 +38,6 @@ def run(main: Callable[[Any], None], snakemake: Any) -> None:
     with Path(snakemake.log[0]).open("w", buffering=1) as log:
         try:
             with redirect_stdout(log), redirect_stderr(log):
-                stop_at_errors_of(getattr(getattr(snakemake, "input", None), "check", None))
                 main(snakemake)
         except InputError as error:
             message = f"dapple: {error}"
@@ -55,13 +51,6 @@ def run(main: Callable[[Any], None], snakemake: Any) -> None:
 def peak_rss_mb() -> float:
     """Most memory that this process has held at a time [MB]."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-
-
-def stop_at_errors_of(check: str | Path | None) -> None:
-    """Raise what a check of the input found wrong, before a first job computes anything."""
-    if check:
-        rows = json.loads(Path(check).read_text())["findings"]
-        findings.stop(Finding(**row) for row in rows)
 
 
 def evenly(n: int, most: int) -> list[int]:

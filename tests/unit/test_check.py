@@ -8,11 +8,12 @@ import yaml
 from tests.unit.test_cloud_readers import las
 from tests.unit.test_plot import plot, tree
 
-from dapple import findings, workflow
+from dapple import findings
 from dapple.check import page
 from dapple.check.inspection import inspect
 from dapple.config.settings import Settings, validate
 from dapple.errors import InputError
+from dapple.findings import Finding
 from dapple.formats import clouds, json
 from dapple.formats.clouds import Cloud
 
@@ -133,9 +134,8 @@ def test_all_faults_come_at_once_and_stop_a_run_in_one_message(tmp_path):
         reconstructions=["polygons", "voxels_0.2"],
     )
     assert len(said(check, "error")) == 3
-    json.write(tmp_path / "check.json", check)
     with pytest.raises(InputError) as error:
-        workflow.stop_at_errors_of(tmp_path / "check.json")
+        findings.stop(Finding(**row) for row in check["findings"])
     for part in ("rounded to 0.5 m", "no attribute 'Reflectance'", "no shot that met nothing"):
         assert part in str(error.value)
 

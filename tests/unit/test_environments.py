@@ -24,6 +24,8 @@ PACKAGES = {
     "sklearn": "scikit-learn",
     "xarray": "xarray netcdf4",
     "yaml": "pyyaml",
+    "annotated_types": "pydantic",
+    "pydantic_core": "pydantic",
 }
 """Packages of conda that bring a module, where they are not called like it."""
 PROGRAMS = {

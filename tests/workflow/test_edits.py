@@ -11,6 +11,8 @@ import yaml
 from tests.workflow import dry_runs
 from tests.workflow.project import SMALL, copy_of_project
 
+OWN = "config/example.yaml"
+
 # What follows from what.
 PAGE = "runtime page"
 CONFIGURED = f"configuration {PAGE}"
@@ -204,3 +206,29 @@ def test_edited_code_reruns_what_depends_on_it_and_nothing_else(finished):
 def test_edited_data_rerun_what_depends_on_them_and_nothing_else(with_tables):
     files = {name: with_tables / name for name in DATA}
     assert differences(with_edits(with_tables, files, "tables.yaml"), DATA, PAGE) == {}
+
+
+@pytest.fixture(scope="module")
+def own_scan(tmp_path_factory):
+    """The same with a cloud, weather, sensors and records as a user brings them."""
+    project = copy_of_project(tmp_path_factory.mktemp("own") / "dapple")
+    dry_runs.pretend_finished(project.folder, OWN)
+    return project.folder
+
+
+def test_nothing_hides_an_edit_from_the_steps_of_an_own_scan(own_scan):
+    edits = {
+        "polygons={voxel_size_m: 0.06}": ({"polygons", "surfels", "light"}, {"ingest", "clean"}),
+        "cloud={unit: cm}": ({"ingest", "clean", "polygons", "light"}, set()),
+        "classify={threshold_db: -6}": ({"classify", "polygons"}, {"ingest", "clean"}),
+    }
+    outputs = dry_runs.many((own_scan, dry(OWN, edit)) for edit in edits)
+    for (edit, (reruns, stays)), output in zip(edits.items(), outputs, strict=True):
+        jobs = planned(output).keys()
+        assert reruns <= jobs, edit
+        assert not stays & jobs, edit
+    files = {name: own_scan / "config/example" / name for name in ("tree.laz", "sensors.csv")}
+    found = with_edits(own_scan, files, OWN)
+    assert {"ingest", "clean", "polygons", "light"} <= found["tree.laz"].keys()
+    assert "sensors" in found["sensors.csv"]
+    assert not {"ingest", "polygons"} & found["sensors.csv"].keys()

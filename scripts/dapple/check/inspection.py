@@ -55,6 +55,19 @@ def inspect(
     return check
 
 
+def stop_at_errors(settings: dict[str, Any], **files: str | Path) -> None:
+    """Look at the files of a run, say what may be wrong, and stop at what is, in one message.
+
+    Raises
+    ------
+    InputError
+        What was found wrong, all of it.
+    """
+    found = [Finding(**row) for row in inspect(settings, **files)["findings"]]
+    findings.say(one for one in found if one.level == "warning")
+    findings.stop(found)
+
+
 def _cloud(
     path: str | Path, settings: dict[str, Any], found: list[Finding]
 ) -> cloud_facts.CloudFacts | None:
