@@ -1,12 +1,12 @@
 """Memory and time of a large scan: points to polygons, shots to voxels.
 
     PYTHONPATH=scripts .venv/bin/python benchmarks/scale.py [--points N ...] [--shots N ...]
+        [--output FOLDER]
 
 A plot of `check.py` with reflectance, of each size that is asked for; shots into a crown, half of
 them misses, chunk by chunk as from a file. Every stage runs in a process of its own, on files as
 its rule does, so that its peak memory is its own. The last rows are what a straight line through
-the sizes tells for 50 million points and 100 million shots. A last argument is the folder of the
-table.
+the sizes tells for 50 million points and 100 million shots. The table goes to `FOLDER`.
 """
 
 import argparse
@@ -117,7 +117,7 @@ def main() -> None:
     arguments.add_argument(
         "--shots", type=int, nargs="*", default=[2_500_000, 5_000_000, 10_000_000]
     )
-    arguments.add_argument("output", nargs="?", type=Path)
+    arguments.add_argument("--output", type=Path)
     options = arguments.parse_args()
     rows = []
     for made, stages, sizes in (
