@@ -1,13 +1,14 @@
 """What can be explored in the report: places, light and times arrive as they were."""
 
 import base64
+import json
 
 import numpy as np
 import pytest
 from tests import made_up_run
 from tests.made_up_run import leaves
 
-from dapple.formats import meshes
+from dapple.formats import meshes, netcdf
 from dapple.report import ground_view, packing, residuals, run_light, sensor_view, tree_view
 
 LABELS = ["1_1", "1_10"]
@@ -100,3 +101,16 @@ def test_the_slider_has_the_map_and_the_sun_of_every_stored_time(folder):
 
 def test_a_run_without_light_has_none_to_show(tmp_path):
     assert run_light.read(tmp_path) is None
+
+
+def test_a_night_has_a_page_too_and_what_is_not_known_is_null(folder):
+    for name in ("sky/sky.nc", "light/polygons.nc", "light/truth.nc"):
+        found = netcdf.read(folder / name)
+        for key in found:
+            if "umol" in str(key):
+                found[key] = found[key] * 0 if "normal" not in str(key) else found[key].clip(max=0)
+                found[key].attrs = {"units": "1", "long_name": "made up"}
+        netcdf.write(folder / name, found)
+    data = next(sensor_view.blocks(run_light.read(folder), folder)).data
+    assert data["flecks"] == [[None, None]] * 2
+    json.loads(json.dumps(data, allow_nan=False))

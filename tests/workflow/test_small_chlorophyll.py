@@ -187,7 +187,7 @@ def test_the_map_has_intervals_lies_in_the_cloud_s_system_and_is_held_against_me
 
 def test_a_page_tells_what_was_read_and_how_far_to_trust_the_map(own_plot):
     page = own_plot.result("chlorophyll/user_report.html").read_text()
-    for text in ("by colour", "EPSG:25832", "2024-06-21 09:30 UTC", "How far to trust it",
+    for text in ("by colour", "EPSG:25832", "2024-06-21 09:30 UTC", "values are extrapolated",
                  "warped to EPSG:25832", "data:image/png"):  # fmt: skip
         assert text in page
 

@@ -17,6 +17,11 @@ def light(values: np.ndarray) -> dict[str, Any]:
     return _packed(filled.astype("<u2"))
 
 
+def known(values: np.ndarray, digits: int) -> list[float | None]:
+    """Numbers as JSON has them: what is not known is null."""
+    return [round(float(one), digits) if np.isfinite(one) else None for one in values]
+
+
 def places(values_m: np.ndarray) -> dict[str, Any]:
     """Coordinates in whole millimetres from the lowest."""
     values_m = np.asarray(values_m, float).reshape(-1, 3)

@@ -62,7 +62,8 @@ def _sums(run: RunLight, name: str) -> pd.DataFrame:
     flecks = daily_light.sunflecks(par, direct, run.open_beam, times)
     found["sunfleck_share"] = 100 * flecks.time_share
     found["sunfleck_light_share"] = 100 * flecks.light_share
-    if np.median(np.diff(times.to_numpy()) / np.timedelta64(1, "m")) <= LONGEST_FLECK_STEP_MIN:
+    step_min = np.diff(times.to_numpy()) / np.timedelta64(1, "m")
+    if len(step_min) and np.median(step_min) <= LONGEST_FLECK_STEP_MIN:
         found["n_sunflecks"] = flecks.per_day
         found["sunfleck_min"] = flecks.median_min
     return found
@@ -86,9 +87,9 @@ def _chart(run: RunLight, folder: Path) -> Chart:
         "times": packing.local(times, run.timezone),
         "timezone": run.timezone,
         "simulated": packing.light(np.stack(series)),
-        "mean": [one.mean(axis=1).round(1).tolist() for one in series],
-        "integral": [sums[name]["integral_mol_m2"].round(2).tolist() for name in names],
-        "flecks": [sums[name]["sunfleck_share"].round(1).tolist() for name in names],
+        "mean": [packing.known(one.mean(axis=1), 1) for one in series],
+        "integral": [packing.known(sums[name]["integral_mol_m2"], 2) for name in names],
+        "flecks": [packing.known(sums[name]["sunfleck_share"], 1) for name in names],
         "records": _records(run),
         "r": _scores(run, "r", 3),
         "rmse": _scores(run, "rmse", 1),
@@ -130,8 +131,8 @@ def _scores(run: RunLight, column: str, digits: int) -> list[list[float | None]]
     if run.per_sensor is None:
         return None
     wide = run.per_sensor.pivot(index="reconstruction", columns="sensor", values=column)
-    wide = wide.reindex(index=list(run.light), columns=run.sensors["sensor"]).round(digits)
-    return [[None if np.isnan(value) else float(value) for value in row] for row in wide.to_numpy()]
+    wide = wide.reindex(index=list(run.light), columns=run.sensors["sensor"])
+    return [packing.known(row, digits) for row in wide.to_numpy(float)]
 
 
 def _intervals(folder: Path, names: list[str]) -> list[dict[str, float] | None] | None:

@@ -73,6 +73,9 @@ def _box(shown: list[dict[str, Any]], wood: dict[str, Any]) -> list[list[float]]
     """Lowest and highest corner of the tree [m], with half its width around it for its shadow."""
     packed = [one.get("centres") or one["leaves"]["corners"] for one in shown]
     packed += [one["corners"] for one in wood.values()]
+    packed = [one for one in packed if one["shape"][0]]
+    if not packed:
+        return [[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]
     low = np.min([one["low_m"] for one in packed], axis=0)
     high = np.max([one["high_m"] for one in packed], axis=0)
     around = 0.5 * (high - low).max() * np.array([1, 1, 0])

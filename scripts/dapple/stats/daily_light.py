@@ -81,7 +81,8 @@ def sunflecks(
     """
     sunny = open_beam > MIN_BEAM
     inside = sunny & (direct > SEEN * np.where(sunny, open_beam, np.inf))
-    step_min = np.median(np.diff(times.to_numpy()) / np.timedelta64(1, "m"))
+    steps = np.diff(times.to_numpy()) / np.timedelta64(1, "m")
+    step_min = float(np.median(steps)) if len(steps) else np.nan
     n_days = len(times.normalize().unique())
     begins = inside & ~np.pad(inside, ((0, 0), (1, 0)))[:, :-1]
     medians = [_median_run(one) * step_min for one in inside]

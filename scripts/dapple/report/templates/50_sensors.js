@@ -89,9 +89,13 @@ charts.sensors = (figure, data) => {
     if (data.rmse && data.rmse[k][state.sensor] !== null) {
       said.push(`RMSE ${data.rmse[k][state.sensor]} ${PAR}`);
     }
-    said.push(`mean ${data.mean[k][state.sensor]} ${PAR}`);
-    said.push(`light integral ${data.integral[k][state.sensor]} mol m⁻²`);
-    said.push(`${data.flecks[k][state.sensor]} % of the time in sunflecks`);
+    for (const [before, values, after] of [
+      ["mean", data.mean, PAR], ["light integral", data.integral, "mol m⁻²"],
+      ["time in sunflecks", data.flecks, "%"],
+    ]) {
+      const value = values[k][state.sensor];
+      if (value !== null) said.push(`${before} ${value} ${after}`);
+    }
     told.textContent = `Sensor ${data.sensors[state.sensor]}, ${said.join(", ")}.`;
   }
 
