@@ -7,7 +7,8 @@ from dapple.workflow import options, run
 
 def main(snakemake):
     path = snakemake.input.cloud
-    cloud, facts = classify(clouds.read(path), where=path, **options(snakemake.params))
+    settings = options(snakemake.params) | {"model": snakemake.input.model or None}
+    cloud, facts = classify(clouds.read(path), where=path, **settings)
     clouds.write(snakemake.output.cloud, cloud)
     json.write(snakemake.output.scores, facts)
 

@@ -7,18 +7,19 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
 NEIGHBOURS = 12
-MAX_DIAMETER_M = 1.0
+SLICES = 5
+"""Slices above the ground in which the stem's cross-section is looked for."""
 
 
-def support(nodes_m: np.ndarray, root_height_m: float) -> np.ndarray:
+def support(nodes_m: np.ndarray, root_top_m: float) -> np.ndarray:
     """Number of nodes whose shortest path to the base runs through each node.
 
     Parameters
     ----------
     nodes_m : (n, 3) float64
         Local frame, z up [m].
-    root_height_m : float
-        Paths end at nodes up to this height above the lowest node [m].
+    root_top_m : float
+        Paths end at nodes up to this height [m].
 
     Returns
     -------
@@ -35,7 +36,7 @@ def support(nodes_m: np.ndarray, root_height_m: float) -> np.ndarray:
     start = np.repeat(np.arange(len(nodes_m)), k)
     graph = _graph(start, neighbour[:, 1:].ravel(), distance[:, 1:].ravel(), len(nodes_m))
     graph = graph + _bridges(nodes_m, graph)
-    roots = np.flatnonzero(nodes_m[:, 2] <= nodes_m[:, 2].min() + root_height_m)
+    roots = np.flatnonzero(nodes_m[:, 2] <= root_top_m)
     cost, previous, _ = dijkstra(
         graph, directed=False, indices=roots, return_predecessors=True, min_only=True
     )
@@ -47,8 +48,8 @@ def support(nodes_m: np.ndarray, root_height_m: float) -> np.ndarray:
     return carried
 
 
-def foot_area_m2(nodes_m: np.ndarray, size_m: float, root_height_m: float) -> float:
-    """Cross-section of all stems at their feet.
+def stem_area_m2(nodes_m: np.ndarray, size_m: float, foot_m: float, slice_m: float) -> float:
+    """Cross-section of all stems above the flare of their feet.
 
     Parameters
     ----------
@@ -56,42 +57,55 @@ def foot_area_m2(nodes_m: np.ndarray, size_m: float, root_height_m: float) -> fl
         Local frame, z up [m].
     size_m : float
         Spacing of the nodes; nodes within twice of it belong to one stem [m].
-    root_height_m : float
-        Height of the slice above the lowest node [m].
+    foot_m : float
+        Height of the ground [m].
+    slice_m : float
+        Thickness of the slices above it [m].
 
     Returns
     -------
     float
-        Sum of circles whose radius is the median distance of a stem's nodes from their axis [m²];
-        0 where no stem has ten nodes.
+        Of the slice where it is smallest: the sum of circles whose radius is the median distance
+        of a stem's nodes from their axis [m²]. A foot is wider than its stem, and so is whatever
+        leaves hang beside it. 0 where no slice has a stem through it.
     """
-    foot = nodes_m[nodes_m[:, 2] <= nodes_m[:, 2].min() + root_height_m]
-    pairs = cKDTree(foot).query_pairs(2 * size_m, output_type="ndarray")
-    linked = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(foot),) * 2)
+    areas = [
+        _area_of_slice_m2(nodes_m, size_m, foot_m + k * slice_m, slice_m) for k in range(SLICES)
+    ]
+    return min((area for area in areas if area > 0), default=0.0)
+
+
+def _area_of_slice_m2(nodes_m: np.ndarray, size_m: float, low_m: float, slice_m: float) -> float:
+    inside = nodes_m[(nodes_m[:, 2] >= low_m) & (nodes_m[:, 2] < low_m + slice_m)]
+    if len(inside) < 2:
+        return 0.0
+    pairs = cKDTree(inside).query_pairs(2 * size_m, output_type="ndarray")
+    linked = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(inside),) * 2)
     n_stems, stem = connected_components(linked, directed=False)
     area_m2 = 0.0
     for number in range(n_stems):
-        plan = foot[stem == number, :2]
-        if len(plan) >= 10:
+        own = inside[stem == number]
+        if np.ptp(own[:, 2]) > 0.6 * slice_m:
+            plan = own[:, :2]
             axis = 0.5 * (plan.min(axis=0) + plan.max(axis=0))
             area_m2 += np.pi * float(np.median(np.hypot(*(plan - axis).T))) ** 2
     return area_m2
 
 
 def distance_beyond_wood(
-    nodes_m: np.ndarray, radius_m: np.ndarray, is_branch: np.ndarray, reach_m: float
+    places_m: np.ndarray, branch_m: np.ndarray, radius_m: np.ndarray, reach_m: float
 ) -> np.ndarray:
-    """How far each node lies outside the nearest branch.
+    """How far places lie outside the nearest branch.
 
     Parameters
     ----------
-    nodes_m : (n, 3) float64
+    places_m : (n, 3) float64
         Local frame [m].
-    radius_m : (n,) float64
-        Radius of the branch that a node is part of, if it is part of one [m].
-    is_branch : (n,) bool
-        Nodes that paths run through. They lie on the surface of the wood, which may be up to a
-        diameter away on the other side.
+    branch_m : (b, 3) float64
+        Nodes of branches. They lie on the surface of the wood, which may be up to a diameter away
+        on the other side [m].
+    radius_m : (b,) float64
+        Radius of the branch that each is part of [m].
     reach_m : float
         Distances beyond this need not be known [m].
 
@@ -100,26 +114,25 @@ def distance_beyond_wood(
     (n,) float64
         Distance to a branch node less the branch's diameter, at most `reach_m` [m].
     """
-    beyond = np.full(len(nodes_m), reach_m)
-    branch = np.flatnonzero(is_branch)
-    if len(branch) == 0:
+    beyond = np.full(len(places_m), reach_m)
+    if len(branch_m) == 0:
         return beyond
-    diameter = np.minimum(2 * radius_m[branch], MAX_DIAMETER_M)
+    diameter = 2 * radius_m
     # One search per half octave of diameters: a node that is near enough to the largest of a
     # group would otherwise be searched for once per branch node.
-    octave = np.floor(2 * np.log2(diameter)).astype(int)
+    octave = np.floor(2 * np.log2(diameter / reach_m)).astype(int)
     for step in np.unique(octave):
         chosen = octave == step
         typical = float(diameter[chosen].mean())
-        distance, _ = cKDTree(nodes_m[branch[chosen]]).query(
-            nodes_m, distance_upper_bound=typical + reach_m
+        distance, _ = cKDTree(branch_m[chosen]).query(
+            places_m, distance_upper_bound=typical + reach_m
         )
         beyond = np.minimum(beyond, distance - typical)
     return beyond
 
 
 def _graph(start, end, distance, n):
-    cost = np.maximum(distance, 1e-6) ** 2
+    cost = np.maximum(distance**2, np.finfo(float).tiny)
     graph = coo_matrix((cost, (start, end)), shape=(n, n)).tocsr()
     return graph.maximum(graph.T)
 

@@ -64,6 +64,12 @@ def _along_branches() -> Method:
     return along_branches
 
 
+def _learned() -> Method:
+    from dapple.cloud.learned import learned
+
+    return learned
+
+
 def _all_leaf() -> Method:
     from dapple.cloud.all_leaf import all_leaf
 
@@ -75,5 +81,6 @@ CLASSIFIERS = {
     "reflectance": Classifier("fixed threshold", ("Reflectance",), _fixed_threshold),
     "mixture": Classifier("threshold from the data", ("Reflectance",), _own_threshold),
     "geometry": Classifier("the course of branches", (), _along_branches),
+    "learned": Classifier("shapes around a point, learned from virtual scans", (), _learned),
     "all_leaf": Classifier("none", (), _all_leaf),
 }

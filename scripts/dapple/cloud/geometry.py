@@ -6,27 +6,37 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from dapple.cloud import branches, eigenvalues, voxel_groups
+from dapple.cloud import branches, voxel_groups
 from dapple.errors import EmptyCloudError
 from dapple.formats.clouds import Cloud
+
+LEAST_POINTS = 50
+QUANTUM = 1e-9
+"""Coordinates are rounded to this share of the cloud's extent: where it stands is forgotten."""
+COARSER = 1, 2, 4
+"""Nodes of so many times the size are looked at, too: on them paths around a thick stem are one."""
+SPACING_POINTS = 20_000
+"""Of so many points the distance to their neighbours is measured."""
+LEAF_AREA_PER_WOOD_AREA = 300.0, 5000.0
+"""Bounds of what is taken from the cloud."""
 
 
 def along_branches(
     cloud: Cloud, settings: Mapping[str, Any], seed: int
 ) -> tuple[np.ndarray, dict[str, float]]:
     """Wood is where paths from leaves to the stem run together; see `classifiers.Method`."""
-    return by_geometry(cloud.xyz_m), {}
+    return by_geometry(cloud.xyz_m, **settings.get("geometry", {})), {}
 
 
 def by_geometry(
     xyz_m: np.ndarray,
     *,
-    min_node_size_m: float = 0.02,
-    min_support: int = 30,
+    node_spacings: float = 1.5,
+    node_share: float = 0.005,
+    foot_share: float = 0.04,
+    thinnest_branch: float = 0.5,
     leaf_area_per_wood_area: float | None = None,
-    root_height_m: float = 0.3,
     slack: float = 0.25,
-    local_weight: float = 1.0,
 ) -> np.ndarray:
     """Part leaf from wood by where branches run.
 
@@ -36,27 +46,27 @@ def by_geometry(
     2. How thick it is follows from what it carries: the pipe model (Shinozaki et al. 1964) gives
        cross-section = carried leaf area / `leaf_area_per_wood_area`. Nodes within the diameter
        of a path are taken for wood.
-    3. The sure nodes of both kinds teach a linear discriminant what wood looks like in this
-       cloud: eigenvalues of the neighbourhoods at three scales (linearity, planarity,
-       scattering, extent) and their tilt. It tips the balance for nodes in between.
+
+    All lengths are taken from the cloud: its unit, its place and its height above the sea do not
+    matter.
 
     Parameters
     ----------
     xyz_m : (n, 3) float64
         Local frame, z up [m]; one tree or several on flat ground, without the ground.
-    min_node_size_m : float
-        Smallest voxel of the nodes [m]; on coarser clouds it is the spacing of the points.
-    min_support : int
-        Paths that carry fewer nodes than this are no branch.
+    node_spacings : float
+        Edge of the nodes, in median distances of neighbouring points.
+    node_share : float
+        Smallest edge of the nodes, as a share of the cloud's height.
+    foot_share : float
+        Paths end at nodes up to this share of the cloud's height.
+    thinnest_branch : float
+        Paths that would be a branch of less than this radius, in nodes, are none.
     leaf_area_per_wood_area : float or None
-        Area of the cloud that a cross-section of wood carries [m² m⁻²], 300 to 5000. None takes
-        it from the stem's foot.
-    root_height_m : float
-        Paths end at nodes up to this height above the lowest [m].
+        Area of the cloud that a cross-section of wood carries [m² m⁻²]. None takes it from the
+        stem, within 300 to 5000.
     slack : float
-        Distance to the branch that still is wood, as a share of the node size.
-    local_weight : float
-        Weight of step 3; 0 leaves it out.
+        Distance to the branch that still is wood, in nodes.
 
     Returns
     -------
@@ -74,36 +84,51 @@ def by_geometry(
     A cloud without a stem (from above, or a crown alone) has no root: results are then poor.
     """
     xyz_m = np.asarray(xyz_m, np.float64)
-    if len(xyz_m) < 50:
+    if len(xyz_m) < LEAST_POINTS:
         raise EmptyCloudError(
             "point cloud",
             f"{len(xyz_m)} points",
-            "at least 50 points of a tree",
+            f"at least {LEAST_POINTS} points of a tree",
             "Check the filters before.",
         )
-    nodes_m, node_of_point, size_m = _nodes(xyz_m, min_node_size_m)
-    carried = branches.support(nodes_m, root_height_m)
-    if leaf_area_per_wood_area is None:
-        foot_m2 = branches.foot_area_m2(nodes_m, size_m, root_height_m)
-        leaf_area_per_wood_area = np.clip(len(nodes_m) * size_m**2 / max(foot_m2, 1e-9), 300, 5000)
-    beyond = branches.distance_beyond_wood(
-        nodes_m,
-        np.sqrt(carried * size_m**2 / (np.pi * leaf_area_per_wood_area)),
-        carried >= min_support,
-        reach_m=2 * size_m,
-    )
-    evidence = 4.0 * (slack - beyond / size_m)
-    if local_weight:
-        features = eigenvalues.features(nodes_m, size_m)
-        wood, leaf = beyond <= 0, beyond > size_m
-        evidence = evidence + local_weight * eigenvalues.discriminate(features, wood, leaf)
-    return ~(evidence > 0)[node_of_point]
-
-
-def _nodes(xyz_m: np.ndarray, min_size_m: float) -> tuple[np.ndarray, np.ndarray, float]:
-    """Centres of gravity of voxels no smaller than the spacing of the points."""
-    some = xyz_m[:: max(1, len(xyz_m) // 20_000)]
-    distance, _ = cKDTree(xyz_m).query(some, 2)
-    size_m = max(min_size_m, float(np.median(distance[:, 1])))
+    xyz_m = _at_home(xyz_m)
+    foot_m, top_m = np.quantile(xyz_m[:, 2], [0.0005, 0.9995])
+    height_m = float(top_m - foot_m)
+    size_m = max(node_spacings * _spacing_m(xyz_m), node_share * height_m)
+    slice_m = max(foot_share * height_m, 2 * size_m)
     groups = voxel_groups.group(xyz_m, size_m)
-    return groups.total(xyz_m) / groups.size[:, None], groups.voxel_of_point, size_m
+    places_m = groups.total(xyz_m) / groups.size[:, None]
+    beyond_m = np.full(len(places_m), np.inf)
+    for coarser in COARSER:
+        node_m = coarser * size_m
+        nodes_m = places_m
+        if coarser > 1:
+            coarse = voxel_groups.group(xyz_m, node_m)
+            nodes_m = coarse.total(xyz_m) / coarse.size[:, None]
+        ratio = leaf_area_per_wood_area
+        if ratio is None:
+            stem_m2 = branches.stem_area_m2(nodes_m, node_m, foot_m, max(slice_m, 2 * node_m))
+            ratio = len(nodes_m) * node_m**2 / stem_m2 if stem_m2 else np.inf
+            ratio = float(np.clip(ratio, *LEAF_AREA_PER_WOOD_AREA))
+        carried = branches.support(nodes_m, foot_m + slice_m)
+        radius_m = np.sqrt(carried * node_m**2 / (np.pi * ratio))
+        thick = radius_m >= thinnest_branch * node_m
+        found = branches.distance_beyond_wood(
+            places_m, nodes_m[thick], radius_m[thick], reach_m=2 * size_m
+        )
+        beyond_m = np.minimum(beyond_m, found)
+    return (beyond_m > slack * size_m)[groups.voxel_of_point]
+
+
+def _at_home(xyz_m: np.ndarray) -> np.ndarray:
+    """The cloud with its lowest corner at the origin, without the rounding of where it stood."""
+    corner = xyz_m.min(axis=0)
+    quantum = QUANTUM * max(float((xyz_m.max(axis=0) - corner).max()), np.finfo(float).tiny)
+    return np.round((xyz_m - corner) / quantum) * quantum
+
+
+def _spacing_m(xyz_m: np.ndarray) -> float:
+    """Median distance of neighbouring points."""
+    some = xyz_m[:: max(1, len(xyz_m) // SPACING_POINTS)]
+    distance, _ = cKDTree(xyz_m).query(some, 2)
+    return float(np.median(distance[:, 1]))

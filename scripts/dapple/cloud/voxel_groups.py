@@ -51,9 +51,7 @@ def group(xyz_m: np.ndarray, voxel_size_m: float) -> Groups:
     """
     if not voxel_size_m > 0:
         raise InputError("voxel_size_m", str(voxel_size_m), "a size above 0 m", "Change it.")
-    # A millionth of a voxel: a coordinate stored as a decimal fraction of a world coordinate, as in
-    # LAS, may come out a hair below the face it lies on.
-    cell = np.floor(xyz_m / voxel_size_m + 1e-6).astype(np.int64)
+    cell = cells(xyz_m, voxel_size_m)
     cell -= cell.min(axis=0)
     n_cells = [int(n) for n in cell.max(axis=0) + 1]
     if n_cells[0] * n_cells[1] * n_cells[2] >= 2**63:
@@ -68,3 +66,10 @@ def group(xyz_m: np.ndarray, voxel_size_m: float) -> Groups:
     key = key[order]
     start = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]]))
     return Groups(order, start)
+
+
+def cells(xyz_m: np.ndarray, voxel_size_m: float) -> np.ndarray:
+    """(n, 3) int64 numbers of the voxels that points fall in, counted from the local origin."""
+    # A millionth of a voxel: a coordinate stored as a decimal fraction of a world coordinate, as in
+    # LAS, may come out a hair below the face it lies on.
+    return np.floor(xyz_m / voxel_size_m + 1e-6).astype(np.int64)

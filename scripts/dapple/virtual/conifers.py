@@ -132,7 +132,7 @@ class Conifer:
 
 
 def grow(
-    species: str,
+    species: str | Habit,
     *,
     height_m: float = 15.0,
     crown_radius_m: float = 2.5,
@@ -148,8 +148,8 @@ def grow(
 
     Parameters
     ----------
-    species : str
-        A key of `HABITS`.
+    species : str or Habit
+        A key of `HABITS`, or another habit.
     height_m, crown_radius_m : float
         Height of the tip; radius of the circle as large as the crown's outline seen from above,
         met within a few percent [m].
@@ -171,16 +171,18 @@ def grow(
     InputError
         An unknown species, or a size that no tree can have.
     """
-    if species not in HABITS:
+    if isinstance(species, str) and species not in HABITS:
         raise InputError("species", species, ", ".join(HABITS), "Name a conifer dapple can grow.")
+    habit = HABITS[species] if isinstance(species, str) else species
+    name = species if isinstance(species, str) else "of its own"
     _check(height_m, crown_radius_m, crown_base_share, dbh_m, leaf_area_m2)
     n_shoots = max(round(leaf_area_m2 / (strips_per_shoot * shoot_length_m * strip_width_m)), 1)
     wide_m = crown_radius_m
     for _ in range(4):  # branches and twigs as long as the outline asks
         # The same seed each time: only the width changes.
-        rng = np.random.default_rng(stream_seed(seed, "conifer", species))
+        rng = np.random.default_rng(stream_seed(seed, "conifer", name))
         tree = _grow(
-            HABITS[species], height_m, crown_base_share * height_m, wide_m, dbh_m, n_shoots,
+            habit, height_m, crown_base_share * height_m, wide_m, dbh_m, n_shoots,
             (shoot_length_m, strip_width_m, strips_per_shoot), rng,
         )  # fmt: skip
         wide_m *= crown_radius_m / np.sqrt(area_m2(outline(tree.leaves.vertices_m)) / np.pi)
