@@ -163,6 +163,17 @@ def data_files(path):
     return DATA_FILES[-len(found) :]
 
 
+def leaf_wood_model():
+    """The file of the learned classifier, where it is asked."""
+    if settings.classify.method != "learned":
+        return []
+    own = settings.classify.model
+    return data(own) if own else beside_code("cloud/leaf_wood_model.npz")
+
+
+LEAF_WOOD_MODEL = leaf_wood_model()
+
+
 def sky_table():
     """The measured sky, where one is configured."""
     radiation = settings.radiation
@@ -322,3 +333,12 @@ def sized(section):
         "sky": results("sky/sky.nc"),
         "optics": results("sky/optics.nc"),
     }
+
+
+def without_shots(wildcards):
+    """Why nothing can be predicted."""
+    sys.exit(
+        f"dapple: rescan: found no shots in `{settings.experiment}`; expected a scan with them. "
+        "Points alone do not tell what a scanner saw through: see docs/input.md for how shots "
+        "come with a cloud."
+    )

@@ -6,6 +6,7 @@ the same functions one after the other. From points to light:
 - `cloud.clean.clean`: points without noise, one a voxel
 - `cloud.classify.classify`: leaf or wood
 - `polygons`, `surfels`, `voxels`: what a scan is rebuilt as
+- `rescan`: which shots of the scan it would end, and where
 - `scene`: what light meets
 - `sun`, `paths`, `products`: shadow rays to the sun's disc; paths back from the sensors, once for
   any sky and spectrum; both put together under a sky
@@ -15,6 +16,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from dapple.errors import EmptyCloudError
@@ -38,6 +40,8 @@ from dapple.structure.polygons import reconstruct
 from dapple.structure.returns import Kinds, kinds_by_place
 from dapple.structure.voxel_sums import Grid
 from dapple.structure.voxels import plant_area_density
+from dapple.virtual import rescan as virtual_rescan
+from dapple.virtual import rescan_scores
 
 
 def polygons(cloud: Cloud, *, seed: int, **settings: Any) -> dict[str, Mesh]:
@@ -136,6 +140,48 @@ def return_kinds(cloud: Cloud, majority_voxel_m: float) -> Kinds:
     """
     kinds = cloud.attributes["Classification"]
     return kinds_by_place(cloud.xyz_m, kinds, voxel_size_m=majority_voxel_m)
+
+
+def rescan(
+    meshes: dict[str, Mesh],
+    voxels: xr.Dataset | None,
+    shots: Iterable[Shots],
+    cloud: Cloud,
+    *,
+    layers: int,
+    tolerance_m: float,
+    max_deviation: float,
+    seed: int,
+    **beam: Any,
+) -> pd.DataFrame:
+    """How many shots a reconstruction predicts, by part of the crown.
+
+    Parameters
+    ----------
+    meshes : dict of str to Mesh
+        `leaf` and `wood`, as far as there are such.
+    voxels : xarray.Dataset or None
+        Plant area density.
+    shots : iterable of Shots
+        To predict: best from a position that the reconstruction was made without.
+    cloud : Cloud
+        Classified, of the whole plant: its box, and how bright leaf and wood are.
+    layers : int
+        Height layers of the crown.
+    tolerance_m : float
+        A range this near to the measured one is right [m].
+    max_deviation : float
+        Returns at or above are mixed of several targets.
+    seed : int
+    **beam
+        Fields of `scanner_model.Scanner`.
+    """
+    shots = list(shots)
+    crown = virtual_rescan.crown_of(cloud)
+    scanner = virtual_rescan.scanner_of(cloud, shots, **beam)
+    found = virtual_rescan.first_ranges(meshes, voxels, shots, crown, scanner, seed=seed)
+    rows = rescan_scores.compared(found, crown, max_deviation)
+    return rescan_scores.by_part(rows, layers, tolerance_m)
 
 
 def scene(

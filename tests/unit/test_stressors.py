@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dapple.errors import InputError
+from dapple.formats import shots as shot_files
 from dapple.formats.meshes import Mesh
 from dapple.formats.shots import Shots
 from dapple.light.moved_sensors import sideways
@@ -192,7 +193,7 @@ def test_noise_has_its_share_and_stays_in_order():
 def test_thinned_shots_keep_their_own_returns():
     shots = some_shots()
     chosen = np.random.default_rng(2).random(len(shots)) < 0.3
-    few = world.kept(shots, chosen)
+    few = shot_files.select(shots, chosen)
     assert len(few) == chosen.sum()
     assert np.array_equal(few.n_returns, shots.n_returns[chosen])
     expected = shots.return_xyz_m[chosen[shots.shot_of_return]]

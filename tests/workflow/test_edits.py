@@ -44,6 +44,9 @@ KEYS = {
     "clean={thin_voxel_m: 0.02}": f"clean {CLASSES}",
     "clean={distance_points: 1000}": "cloud_to_mesh",
     "classify={threshold_db: -5}": CLASSES,
+    "classify={method: learned}": CLASSES,
+    "classify={training_trees: 5}": "",  # the model is taught on demand
+    "rescan={layers: 3}": "",  # shots are predicted on demand
     "polygons={voxel_size_m: 0.06}": f"{POLYGONS} {traced(4)}",
     "surfels={overlap: 1.5}": f"surfels {traced(1)}",
     "voxels={estimator: ppl}": f"voxels*2 voxels_summary*2 {traced(2)}",
@@ -77,6 +80,8 @@ CODE = {
     "virtual/plants.py": PLANT,
     "virtual/scanner.py": SCAN,
     "cloud/clean.py": f"clean {CLASSES}",
+    "cloud/eigenvalues.py": CLASSES,
+    "virtual/leaf_wood_training.py": "",
     "structure/polygons.py": f"{POLYGONS} {traced(4)}",
     "structure/surfels.py": f"surfels {traced(1)}",
     "structure/voxels.py": f"voxels*2 voxels_summary*2 {traced(2)}",

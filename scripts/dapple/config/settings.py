@@ -29,6 +29,7 @@ from dapple.config.plant import Plant
 from dapple.config.polygons import Polygons
 from dapple.config.radiation import Radiation
 from dapple.config.registration import Registration
+from dapple.config.rescan import Rescan
 from dapple.config.scan import Scan
 from dapple.config.scan_frame import ScanFrame
 from dapple.config.sensors import Sensors
@@ -83,6 +84,7 @@ class Settings(Section):
     surfels: Surfels = Surfels()
     voxels: Voxels = Voxels()
     corrections: Corrections = Corrections()
+    rescan: Rescan = Rescan()
     site: Site = Site()
     time: Time = Time()
     radiation: Radiation = Radiation()

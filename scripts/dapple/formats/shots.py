@@ -118,6 +118,12 @@ def concatenate(chunks: Iterable[Shots]) -> Shots:
     )
 
 
+def select(shots: Shots, chosen: np.ndarray) -> Shots:
+    """The shots that a mask (n,) chooses, with their returns."""
+    returns = np.repeat(chosen, shots.n_returns)
+    return _taken(shots, chosen, returns, _first(shots.n_returns[chosen]))
+
+
 def to_cloud(shots: Shots) -> Cloud:
     """The returns of shots as points.
 
@@ -154,11 +160,18 @@ def part(shots: Shots, start: int, stop: int) -> Shots:
     """Shots `start` to `stop` (not included), sharing memory with the whole."""
     stop = min(stop, len(shots))
     returns = slice(shots.first[start], shots.first[stop])
+    first = shots.first[start : stop + 1] - shots.first[start]
+    return _taken(shots, slice(start, stop), returns, first)
+
+
+def _taken(
+    shots: Shots, own: slice | np.ndarray, returns: slice | np.ndarray, first: np.ndarray
+) -> Shots:
     return Shots(
-        shots.origin_m[start:stop],
-        shots.direction[start:stop],
-        shots.scan[start:stop],
-        shots.first[start : stop + 1] - shots.first[start],
+        shots.origin_m[own],
+        shots.direction[own],
+        shots.scan[own],
+        first,
         shots.range_m[returns],
         shots.reflectance_db[returns],
         shots.deviation[returns],

@@ -232,7 +232,7 @@ def scan(
     if conditions.noise_share:
         shots = with_noise(shots, conditions.noise_share, setup.ground_z_m, rng)
     if conditions.kept_share < 1:
-        shots = kept(shots, rng.random(len(shots)) < conditions.kept_share)
+        shots = shot_files.select(shots, rng.random(len(shots)) < conditions.kept_share)
     if conditions.misregistration_m:
         shots = misregistered(shots, conditions.misregistration_m, rng)
     return shots, positions_m
@@ -248,19 +248,6 @@ def around(n: int, span_deg: float, radius_m: float, height_m: float, seed: int)
         azimuth = first + (np.linspace(-half, half, n) if n > 1 else np.zeros(1))
     return np.stack(
         [radius_m * np.sin(azimuth), radius_m * np.cos(azimuth), np.full(n, height_m)], axis=1
-    )
-
-
-def kept(shots: Shots, chosen: np.ndarray) -> Shots:
-    """The shots that a mask (n,) chooses, with their returns."""
-    returns = np.repeat(chosen, shots.n_returns)
-    return replace(
-        shots,
-        origin_m=shots.origin_m[chosen],
-        direction=shots.direction[chosen],
-        scan=shots.scan[chosen],
-        first=np.concatenate([[0], np.cumsum(shots.n_returns[chosen])]),
-        **_returns(shots, np.flatnonzero(returns)),
     )
 
 
