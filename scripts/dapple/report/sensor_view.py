@@ -99,6 +99,8 @@ def _chart(run: RunLight, folder: Path) -> Chart:
         "Choose a sensor on the plan or in the list: its light in every reconstruction, and what "
         "was recorded there."
     )
+    if data["r"]:
+        caption += " Pale on the plan: nothing is known, as no record of them counts."
     if every > 1:
         caption += f" Every {every}th time is shown."
     if data["interval"]:

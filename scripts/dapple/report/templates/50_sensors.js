@@ -25,13 +25,17 @@ charts.sensors = (figure, data) => {
 
   function drawPlan() {
     const by = measures[state.by], values = by.values[state.name];
+    const known = values.filter((value) => value !== null);
     const traces = [
       {
         type: "scatter", mode: "markers", x: data.x_m, y: data.y_m, text: data.sensors.map(plain),
         customdata: values.map((value) => (value === null ? "unknown" : `${value} ${by.unit}`)),
         hovertemplate: `sensor %{text}: ${by.label} %{customdata}<extra></extra>`,
         marker: {
-          size: 15, color: values, colorscale: by.scale, line: { color: "#555", width: 1 },
+          size: 15, color: values.map((value) => (value === null ? 0 : value)),
+          opacity: values.map((value) => (value === null ? 0.15 : 1)),
+          cmin: Math.min(...known), cmax: Math.max(...known),
+          colorscale: by.scale, line: { color: "#555", width: 1 },
           colorbar: { title: { text: `${by.label} ${by.unit}`, side: "right" }, thickness: 12 },
         },
       },
@@ -106,8 +110,9 @@ charts.sensors = (figure, data) => {
     drawSeries();
   }
 
-  // The sensor that tells most at first: the one whose light changes most.
+  // The sensor that tells most at first: of those with records, the one whose light changes most.
   const first = data.sensors.map((_, k) => {
+    if (data.r && data.r[state.name][k] === null) return -1;
     const line = own(simulated, t, state.name * n + k).filter((value) => value !== null);
     const steps = line.slice(1).map((value, i) => Math.abs(value - line[i]));
     return steps.reduce((sum, value) => sum + value, 0);
