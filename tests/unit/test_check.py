@@ -148,6 +148,25 @@ def test_a_file_that_cannot_be_read_is_a_finding_too(tmp_path):
     assert "ERROR" in page.text(check)
 
 
+def test_heights_above_the_ground_are_judged_as_such(tmp_path):
+    cloud = Cloud(one_tree().xyz_m + [0.0, 0.0, 3.0], np.array([410_500.0, 5_317_080.0, 280.0]))
+    clouds.write(tmp_path / "tree.laz", cloud)
+    table = tmp_path / "sensors.csv"
+    table.write_text("sensor,x,y,z,tilt_deg\na,410501,5317081,0.1,30\n")
+    facing = {"kind": "table", "azimuth_deg": 180.0}
+    world, above = (
+        inspect(
+            settings(sensors=facing | {"heights": heights}),
+            cloud=tmp_path / "tree.laz",
+            sensors=table,
+        )
+        for heights in ("world", "above_ground")
+    )
+    assert said(world, "error")
+    assert not said(above, "error")
+    assert above["sensors"]["least_height_m"] == pytest.approx(0.1, abs=1e-6)
+
+
 def test_sensors_in_the_cloud_s_own_world_need_no_origin(tmp_path):
     cloud = Cloud(one_tree().xyz_m, np.array([410_500.0, 5_317_080.0, 0.0]))
     clouds.write(tmp_path / "tree.laz", cloud)

@@ -10,7 +10,10 @@ from dapple.errors import InputError
 from dapple.findings import Finding
 from dapple.formats import clouds
 
-COLUMNS = ("sensor_column", "x_column", "y_column", "z_column", "decimal")
+COLUMNS = (
+    *("sensor_column", "x_column", "y_column", "z_column", "decimal"),
+    *("heights", "tilt_deg", "azimuth_deg"),
+)
 """Keys of `sensors` that say how its table is read."""
 
 
