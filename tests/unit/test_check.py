@@ -149,7 +149,9 @@ def test_a_file_that_cannot_be_read_is_a_finding_too(tmp_path):
 
 
 def test_heights_above_the_ground_are_judged_as_such(tmp_path):
-    cloud = Cloud(one_tree().xyz_m + [0.0, 0.0, 3.0], np.array([410_500.0, 5_317_080.0, 280.0]))
+    cloud = Cloud(
+        one_tree().xyz_m + np.array([0.0, 0.0, 3.0]), np.array([410_500.0, 5_317_080.0, 280.0])
+    )
     clouds.write(tmp_path / "tree.laz", cloud)
     table = tmp_path / "sensors.csv"
     table.write_text("sensor,x,y,z,tilt_deg\na,410501,5317081,0.1,30\n")
