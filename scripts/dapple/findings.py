@@ -64,11 +64,16 @@ def note(where: str | Path, found: str) -> Finding:
 
 
 def stop(findings: Iterable[Finding]) -> None:
-    """Raise an `InputError` of the first error; the others follow in its remedy."""
+    """Raise an `InputError` of the first error; the others follow in its remedy.
+
+    The lines that mend them come last, ready to paste into the configuration.
+    """
     errors = [one for one in findings if one.level == "error"]
     if errors:
         first, *others = errors
         remedy = " ".join([first.remedy, *(f"Besides, {one}" for one in others)])
+        if lines := dict.fromkeys(one.yaml for one in errors if one.yaml):
+            remedy = "\n".join([f"{remedy} In the configuration:", *lines])
         raise InputError(first.where, first.found, first.expected, remedy)
 
 

@@ -98,12 +98,13 @@ def script(name):
     return module
 
 
-def rule(tmp_path, inputs, outputs, params):
+def rule(tmp_path, inputs, outputs, params, config=None):
     """What Snakemake would hand to a script."""
     return SimpleNamespace(
         input=SimpleNamespace(**{key: _text(value) for key, value in inputs.items()}),
         output=SimpleNamespace(**{key: str(tmp_path / name) for key, name in outputs.items()}),
         params=SimpleNamespace(**params),
+        config=config,
     )
 
 
@@ -115,7 +116,10 @@ def ingest(tmp_path, path, required=("Reflectance",)):
     params = {"shots": "none", "scan_frame": {}, "required": list(required)}
     params |= {"unit": "auto", "up": "z"}
     outputs = {"points": "points.laz", "frame": "frame.json"}
-    job = rule(tmp_path, {"cloud": path, "positions": ""}, outputs, params)
+    method = "reflectance" if required else "geometry"
+    config = {"source": "cloud", "cloud": {"path": str(path)}, "reconstructions": ["polygons"]}
+    config |= {"classify": {"method": method}, "measured": {"kind": "none"}}
+    job = rule(tmp_path, {"cloud": path, "positions": ""}, outputs, params, config)
     script("ingest").main(job)
     return clouds.read(job.output.points)
 
@@ -134,7 +138,7 @@ def test_a_cloud_without_reflectance_names_the_file_what_it_has_and_what_else_wo
     clouds.write(path, some_cloud(Deviation=np.ones(3000, np.float32)))
     message = refused(tmp_path, path)
     assert "no attribute 'Reflectance' (there are: Deviation)" in message
-    assert "choose a method that does without it" in message
+    assert "classify:\n  method: geometry" in message
     assert len(ingest(tmp_path, path, required=())) == 3000
 
 
@@ -161,7 +165,7 @@ def test_world_coordinates_without_an_offset_keep_their_tenths_of_millimetres(tm
     world_m = some_cloud().xyz_m + np.array([410_500.0, 5_317_080.0, 280.0])
     rows = [" ".join(f"{value:.4f}" for value in point) + " -8" for point in world_m]
     path.write_text("\n".join(["X Y Z Reflectance", *rows]))
-    cloud = ingest(tmp_path, path)
+    cloud = ingest(tmp_path, path, required=())
     assert np.abs(cloud.xyz_m[:, :2]).max() < 100
     assert cloud.world_xyz_m == pytest.approx(world_m, abs=1e-4)
 
@@ -173,7 +177,7 @@ LEAF = Mesh(
 )
 SENSORS = {
     "kind": "table",
-    "table": {},
+    "table": {"heights": "world"},
     "grid": {},
     "ground_z_m": 0.0,
     "origin_m": [0.0, 0.0, 0.0],
