@@ -17,6 +17,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
@@ -120,7 +121,9 @@ def classified(path: Path, settings: Settings) -> clouds.Cloud:
     return classify(cloud, where="scan", **options, seed=seed)[0]
 
 
-def sunlit(meshes: dict[str, Mesh], settings: Settings, wood: Mesh) -> tuple[np.ndarray, float]:
+def sunlit(
+    meshes: dict[str, Mesh], settings: Settings, wood: Mesh, voxels: xr.Dataset | None = None
+) -> tuple[np.ndarray, float]:
     """Share of the sun's disc (sensor, time), and the processor time that it took [s]."""
     grid = settings.sensors.grid()
     places = sensors.grid_around(stem_position(wood), **grid)[["x_m", "y_m", "z_m"]].to_numpy()
@@ -131,7 +134,7 @@ def sunlit(meshes: dict[str, Mesh], settings: Settings, wood: Mesh) -> tuple[np.
         np.radians(sun[f"sun_{name}_deg"].to_numpy()) for name in ("zenith", "azimuth")
     )
     towards = [np.sin(zenith) * np.sin(azimuth), np.sin(zenith) * np.cos(azimuth), np.cos(zenith)]
-    scene = traced.load(steps.scene(meshes))
+    scene = traced.load(steps.scene(meshes, voxels))
     begun = time.process_time()
     seen = visibility.sunlit(
         scene,
