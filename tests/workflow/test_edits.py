@@ -91,7 +91,6 @@ CODE = {
     "scene/sensors.py": f"sensors tree_figure {traced(5)}",
     "light/paths.py": f"transport*5 light*5 agreement {MAP} {COMPARED}",
     "light/series.py": f"light*5 agreement {MAP} {COMPARED}",
-    "report/tree_view.py": "",
     "light/timestep.py": checked(5),
     "light/moved_sensors.py": "verdict",
     "registration/fit.py": "",  # nothing is fitted
@@ -206,6 +205,12 @@ def test_an_edited_key_reruns_what_depends_on_it_and_nothing_else(finished):
 def test_edited_code_reruns_what_depends_on_it_and_nothing_else(finished):
     files = {name: finished / "scripts/dapple" / name for name in CODE}
     assert differences(with_edits(finished, files, SMALL), CODE, PAGE) == {}
+
+
+def test_an_edited_view_of_the_report_writes_its_page_anew_and_nothing_else(finished):
+    name = "report/tree_view.py"
+    found = with_edits(finished, {name: finished / "scripts/dapple" / name}, SMALL)
+    assert found == {name: Counter(page=1)}
 
 
 def test_edited_data_rerun_what_depends_on_them_and_nothing_else(with_tables):

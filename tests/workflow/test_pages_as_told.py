@@ -18,6 +18,7 @@ NEEDS = re.compile(r"config/(apple|leafy-tree|single-scan|pine-plot)\.yaml")
 ELSEWHERE = (
     "path/to/",
     "config/mine.yaml",
+    "config/RUN.yaml",
     "--profile",
     "--sdm",
     "--report",

@@ -52,9 +52,11 @@ def call(r_file: str | Path, function: str, *arguments: Any, packages: tuple[str
     from rpy2.robjects.conversion import localconverter
 
     _require(robjects, packages)
+    environment = robjects.r("new.env()")
+    # R itself cannot open a file whose path its locale cannot spell.
+    source = robjects.r["parse"](text=Path(r_file).read_text(encoding="utf-8"))
+    robjects.r["eval"](source, environment)
     with localconverter(default_converter + pandas2ri.converter):
-        environment = robjects.r("new.env()")
-        robjects.r["source"](str(r_file), local=environment)
         try:
             result = environment[function](*map(_plain, arguments))
         except RRuntimeError as error:
