@@ -6,7 +6,7 @@ import pye57
 import pytest
 
 from dapple.errors import EmptyCloudError, InputError
-from dapple.formats import clouds
+from dapple.formats import cloud_las, clouds
 from dapple.formats.cloud_ptx import scans
 from dapple.formats.clouds import Cloud
 
@@ -300,3 +300,9 @@ def test_an_attribute_that_las_would_cut_is_refused_and_leaves_no_file(tmp_path)
 def test_a_point_beyond_the_reach_of_las_is_refused(tmp_path):
     with pytest.raises(InputError, match="a point 1000000 m from the local origin"):
         clouds.write(tmp_path / "a.laz", Cloud(np.array([[1e6, 0.0, 0.0]])))
+
+
+def test_the_day_of_writing_does_not_change_a_byte(tmp_path):
+    clouds.write(tmp_path / "tree.laz", some_cloud())
+    with laspy.open(tmp_path / "tree.laz") as file:
+        assert file.header.creation_date == cloud_las.SAME_DAY

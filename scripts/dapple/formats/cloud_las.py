@@ -1,6 +1,7 @@
 """LAS and LAZ, read in chunks, written as 1.4 with point format 6."""
 
 from collections.abc import Iterator
+from datetime import date
 from pathlib import Path
 
 import laspy
@@ -33,6 +34,8 @@ FIELDS = {*STANDARD, "ScanAngle"}
 WRITABLE = FIELDS - {"Red", "Green", "Blue"}
 SCAN_ANGLE_STEP_DEG = 0.006
 """Step of the field `scan_angle` of point formats 6 to 10; older ones count whole degrees."""
+SAME_DAY = date(2000, 1, 1)
+"""In every header: the same points are the same bytes on any day."""
 VLR_USER, VLR_ID = "dapple", 1
 """Names the standard fields that mean something: LAS cannot tell class 0 from never classified."""
 
@@ -75,6 +78,7 @@ def write(path: Path, raw: RawCloud, scale_m: float = 1e-4, crs: str | None = No
     holds the numbers, integers as they are. `crs` names the coordinate system, as "EPSG:25832".
     """
     header = laspy.LasHeader(point_format=6, version="1.4")
+    header.creation_date = SAME_DAY
     header.offsets, header.scales = raw.origin_m, np.full(3, scale_m)
     header.generating_software = "dapple"
     header.global_encoding.wkt = True  # point formats 6 to 10 ask for it, PDAL complains without
