@@ -3,8 +3,9 @@
     python benchmarks/page_tables.py RUN [--results results]
 
 RUN is an experiment whose results lie in RESULTS, or `verdicts` for those of all real trees, or
-`scaling` for what follows from docs/data/scaling.csv; what the pages show of it is written to
-docs/data. `docs/data/README.md` lists the tables.
+`scaling` and `worse-records` for what follows from docs/data/scaling.csv and
+stability_records.csv; what the pages show of it is written to docs/data. `docs/data/README.md`
+lists the tables.
 """
 
 import argparse
@@ -83,6 +84,33 @@ def verdicts(folder: Path) -> dict[str, pd.DataFrame]:
     return {"real_verdicts": pd.DataFrame(rows)}
 
 
+def worse_records(folder: Path) -> dict[str, pd.DataFrame]:
+    """What worse records do to r and relative RMSE: over draws, median, least and most."""
+    table = pd.read_csv(DATA / "stability_records.csv")
+    table["trouble"] = [
+        WORSE[stressor].format(level * 100 if stressor == "sensor_position" else level)
+        for stressor, level in zip(table["stressor"], table["level"], strict=True)
+    ]
+    table["reconstruction"] = table["reconstruction"].str.replace(".", "")
+    columns = ["stressor", "trouble"]
+    parts = table.groupby([*columns, "reconstruction"])[["r", "rmse_rel"]].agg(
+        ["median", "min", "max"]
+    )
+    parts.columns = ["_".join(names) for names in parts.columns]
+    wide = parts.unstack("reconstruction")
+    wide.columns = ["_".join(names) for names in wide.columns]
+    order = table.drop_duplicates(columns).set_index(columns).index
+    return {"stability_records_summary": wide.loc[order].reset_index()}
+
+
+WORSE = {
+    "clock_offset": "clocks {:.0f} min off",
+    "sensor_position": "sensors {:.0f} cm off",
+    "few_sensors": "{:.0%} of the sensors",
+    "few_records": "{:.1%} of the records",
+}
+
+
 def scaling(folder: Path) -> dict[str, pd.DataFrame]:
     """Processor time at the largest number of triangles over that at the smallest."""
     table = pd.read_csv(DATA / "scaling.csv")
@@ -100,6 +128,7 @@ RUNS: dict[str, Callable[[Path], dict[str, pd.DataFrame]]] = {
     "stability": stability_tables.tables,
     "verdicts": verdicts,
     "scaling": scaling,
+    "worse-records": worse_records,
 }
 
 
