@@ -161,9 +161,6 @@ def train(
     Layers, activation (ReLU), residual block from the third to the last hidden layer, sigmoid,
     loss, rate and decay: Zhao et al. (2025).
     """
-    import jax
-    import optax
-
     rng = np.random.default_rng(seed)
     mean, scale = features.mean(axis=0, dtype=np.float64), features.std(axis=0, dtype=np.float64)
     mean, scale = mean.astype(np.float32), np.maximum(scale, 1e-6).astype(np.float32)
@@ -174,20 +171,9 @@ def train(
         ((t - low) / (high - low)).astype(np.float32) for t in (target, validation_target)
     )
     n_steps = max_epochs * max(1, len(x) // batch)
-    rate = optax.cosine_decay_schedule(learning_rate, n_steps, last_rate_share)
-    optimizer = optax.adamw(rate, weight_decay=weight_decay)
+    optimizer, step = _compiled_step(block, learning_rate, last_rate_share, n_steps, weight_decay)
     weights = _first_weights(rng, (features.shape[1], *hidden, *[hidden[-1]] * block, 1))
     state = optimizer.init(weights)
-
-    def loss(weights, x, y):
-        return ((_forward(weights, x, block) - y) ** 2).mean()
-
-    @jax.jit
-    def step(weights, state, x, y):
-        value, gradient = jax.value_and_grad(loss)(weights, x, y)
-        update, state = optimizer.update(gradient, state, weights)
-        return optax.apply_updates(weights, update), state, value
-
     best, best_loss, best_epoch, rows = weights, np.inf, 0, []
     for epoch in range(1, max_epochs + 1):
         losses = []
@@ -236,6 +222,29 @@ def _forward(weights, x, block):
         if layer == before - 1:
             skipped = x
     return jax.nn.sigmoid((x + skipped) @ matrix + offset)[:, 0]
+
+
+@cache
+def _compiled_step(
+    block: int, learning_rate: float, last_rate_share: float, n_steps: int, weight_decay: float
+):
+    """The optimizer and one step of it; networks of other seeds need no compiling of their own."""
+    import jax
+    import optax
+
+    rate = optax.cosine_decay_schedule(learning_rate, n_steps, last_rate_share)
+    optimizer = optax.adamw(rate, weight_decay=weight_decay)
+
+    def loss(weights, x, y):
+        return ((_forward(weights, x, block) - y) ** 2).mean()
+
+    @jax.jit
+    def step(weights, state, x, y):
+        value, gradient = jax.value_and_grad(loss)(weights, x, y)
+        update, state = optimizer.update(gradient, state, weights)
+        return optax.apply_updates(weights, update), state, value
+
+    return optimizer, step
 
 
 @cache
