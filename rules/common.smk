@@ -58,7 +58,7 @@ REFERENCE_BATCHES = range(-(-len(REFERENCE_TIMES) // BATCH))
 GROUND_Z_M = settings.ground_z_m or 0.0
 ONE_OF_MANY = settings.tree.id is not None or settings.tree.at is not None
 SKY = {
-    "site": settings.site.model_dump(exclude={"timezone"}),
+    "site": settings.site.model_dump(exclude={"timezone", "crs"}),
     "radiation": settings.radiation.broadband(),
     "atmosphere": settings.radiation.atmosphere(),
 }
@@ -224,6 +224,17 @@ def stream(*names):
 
 GROUND = results("scan/ground.nc") if settings.source == "cloud" else []
 SHADE = results("tree/neighbours.ply") if ONE_OF_MANY else []
+# Where the local frame lies on the Earth; a virtual tree stands at the site.
+WORLD_OF_CLOUD = results("scan/frame.json") if settings.source == "cloud" else []
+WORLD = {
+    "crs": settings.site.crs,
+    "origin_m": settings.registration.origin_m,
+    "site": (
+        settings.site.model_dump(include={"latitude_deg", "longitude_deg"})
+        if settings.source == "virtual"
+        else None
+    ),
+}
 
 
 def leaf_meshes(reconstruction):

@@ -9,7 +9,8 @@ Makes   light/transport/{reconstruction}_{placement}.nc counted paths: any sky, 
         light/reference/{reconstruction}.nc             its series
         light/less_timesteps/{reconstruction}/{batch}.nc
         light/less/{reconstruction}.nc                  the same by LESS 3, another independent check
-        light/ground_map.nc                             light on the ground, hour by hour
+        light/ground_map.nc, .tif                       light on the ground, hour by hour
+        light/ground_sum.tif                            the same, summed over the day
         export/{reconstruction}/                        the scene for LESS 3 (`less3/`) and as glTF (`scene.glb`)
 """
 
@@ -56,6 +57,9 @@ rule reference:
             batch=REFERENCE_BATCHES,
             allow_missing=True,
         ),
+        sensors=results("sky/sensors.csv"),
+        cloud=WORLD_OF_CLOUD,
+        registration=FITTED,
         code=code("reference"),
     output:
         light=(
@@ -72,6 +76,8 @@ rule reference:
     threads: 1
     resources:
         mem_mb=memory(1000),
+    params:
+        world=WORLD,
     message:
         said("series of the timesteps, {wildcards.reconstruction}")
     script:
@@ -156,6 +162,9 @@ rule export_scene:
 rule less:
     input:
         times=less_batches,
+        sensors=results("sky/sensors.csv"),
+        cloud=WORLD_OF_CLOUD,
+        registration=FITTED,
         code=code("reference"),
     output:
         light=(
@@ -172,6 +181,8 @@ rule less:
     threads: 1
     resources:
         mem_mb=memory(1000),
+    params:
+        world=WORLD,
     message:
         said("series of LESS, {wildcards.reconstruction}")
     script:
@@ -231,6 +242,8 @@ if settings.light.engine == "transport":
             model=results("light/model.json") if ADVISED else [],
             ground=GROUND,
             shade=SHADE,
+            cloud=WORLD_OF_CLOUD,
+            registration=FITTED,
             code=code("light"),
         output:
             light=results("light/{reconstruction}.nc"),
@@ -253,6 +266,7 @@ if settings.light.engine == "transport":
                 "response",
             ),
             ground_z_m=GROUND_Z_M,
+            world=WORLD,
             n_times=N_TIMES,
             variant=f"{VARIANT}_mono",
             seed=stream("light"),
@@ -270,9 +284,13 @@ rule ground_map:
         optics=results("sky/optics.nc"),
         ground=GROUND,
         shade=SHADE,
+        cloud=WORLD_OF_CLOUD,
+        registration=FITTED,
         code=code("ground_map"),
     output:
         map=results("light/ground_map.nc"),
+        hourly=results("light/ground_map.tif"),
+        daily=results("light/ground_sum.tif"),
     log:
         logs("ground_map"),
     benchmark:
@@ -290,6 +308,7 @@ rule ground_map:
         tracing=tracing("sun_diameter_deg", "sun_kernel_deg")
         | {"variant": f"{VARIANT}_mono"},
         ground_z_m=GROUND_Z_M,
+        world=WORLD,
         seed=stream("ground_map"),
     message:
         said("light on the ground around the tree")

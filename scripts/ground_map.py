@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from dapple.formats import netcdf
+from dapple.formats import georeference, netcdf, rasters
 from dapple.light.par_on_ground import par_on_ground
 from dapple.scene import scene_files, scene_optics
+from dapple.stats import ground_sums
 from dapple.times import hourly, spread
 from dapple.workflow import run
 
@@ -31,7 +32,12 @@ def main(snakemake):
         seed=params.seed,
         **params.tracing,
     )
-    netcdf.write(snakemake.output.map, par)
+    frame = georeference.read(inputs.cloud, inputs.registration, **params.world)
+    found = georeference.located(ground_sums.with_sum(par, params.timezone), frame)
+    netcdf.write(snakemake.output.map, found)
+    for output, name in (("hourly", ground_sums.PAR), ("daily", ground_sums.SUM)):
+        made = ground_sums.raster(found[name], frame)
+        rasters.write(snakemake.output[output], made, cloud_optimized=True)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 """PAR through the day: direct beam traced now, sky and scattered light from counted paths."""
 
 from dapple import steps
-from dapple.formats import json, netcdf, tables
-from dapple.light import light_datasets, series, transport_files
+from dapple.formats import georeference, json, netcdf, tables
+from dapple.light import light_datasets, placed_light, series, transport_files
 from dapple.light.light_model import Model, Tracing
 from dapple.scene import scene_files, scene_optics, sensors, traced
 from dapple.scene.facing import facing_of
@@ -26,7 +26,8 @@ def main(snakemake):
         paths = transport_files.read(counted)
         placements.append(steps.products(sunlit, paths, sky, optics, model, tracing, facing))
     light = light_datasets.as_dataset(series.mean(placements), table["sensor"], netcdf.times(sky))
-    netcdf.write(snakemake.output.light, light)
+    frame = georeference.read(inputs.cloud, inputs.registration, **params.world)
+    netcdf.write(snakemake.output.light, placed_light.at_sensors(light, table, frame))
 
 
 if __name__ == "__main__":

@@ -15,9 +15,10 @@ from typing import Any
 from rocrate.model.contextentity import ContextEntity
 from rocrate.rocrate import ROCrate
 
+from dapple import VERSION
+
 WORKFLOW_RUN_TERMS = "https://w3id.org/ro/terms/workflow-run/context"
 NAME = "ro-crate-metadata.json"
-VERSION = "0.1.0"
 LICENSE = "https://spdx.org/licenses/GPL-3.0-or-later"
 MEDIA_TYPES = {
     ".nc": "application/netcdf",

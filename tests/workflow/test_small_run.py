@@ -2,10 +2,14 @@
 
 import json
 import re
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+import rasterio
 import xarray as xr
 import yaml
 from plotly.offline import get_plotlyjs
@@ -82,6 +86,39 @@ def test_light_of_every_reconstruction_covers_all_sensors_and_times(small_run, n
         assert (values >= 0).all()
     parts = sum(light[f"par_{part}_umol_m2_s"] for part in ("direct", "sky", "scattered"))
     np.testing.assert_allclose(parts, light["par_umol_m2_s"], rtol=1e-5)
+
+
+def test_netcdf_keeps_to_the_cf_conventions(small_run, tmp_path):
+    files = [*small_run.result("light").glob("*.nc")]
+    files += small_run.result("structure").glob("voxels_*/voxels.nc")
+    files += small_run.result("light/reference").glob("*.nc")
+    checker = Path(sys.executable).with_name("compliance-checker")
+    found = tmp_path / "found.json"
+    command = [checker, "--test=cf:1.11", "--criteria=strict", "--format=json_new", "-o", found]
+    subprocess.run([*command, *files], capture_output=True)
+    reports = json.loads(found.read_text())
+    wrong = {
+        Path(name).name: priority["msgs"]
+        for name, report in reports.items()
+        for level in ("high_priorities", "medium_priorities")
+        for priority in report["cf:1.11"][level]
+        if priority["msgs"]
+    }
+    assert len(reports) == len(files)
+    assert not wrong
+
+
+def test_maps_for_other_programs_are_the_maps_of_the_run(small_run):
+    with xr.open_dataset(small_run.result("light/ground_map.nc")) as maps:
+        maps.load()
+    for path, name in (("ground_map.tif", "par_umol_m2_s"), ("ground_sum.tif", "par_sum_mol_m2_d")):
+        with rasterio.open(small_run.result(f"light/{path}")) as file:
+            values = file.read()
+            assert file.tags(ns="IMAGE_STRUCTURE")["LAYOUT"] == "COG"
+            assert file.bounds.left < 0 < file.bounds.right  # around the stem at the site
+            assert file.crs.is_projected
+        expected = np.atleast_3d(maps[name].to_numpy().T).T[:, ::-1]
+        np.testing.assert_allclose(values, expected, rtol=1e-6)
 
 
 @pytest.mark.parametrize("name", RECONSTRUCTIONS)

@@ -1,4 +1,4 @@
-"""NetCDF datasets with units and names on every variable, and times that say their zone."""
+"""NetCDF datasets after the CF conventions: units and names on every variable, times in UTC."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -8,11 +8,24 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from dapple import VERSION
 from dapple.errors import InputError
 from dapple.formats.atomic import atomic
 from dapple.times import utc
 
 TIME_ENCODING = {"units": "milliseconds since 1970-01-01", "dtype": "int64"}
+TIME = {
+    "long_name": "time",
+    "standard_name": "time",
+    "axis": "T",
+    "time_zone": "UTC",
+    "units_metadata": "leap_seconds: none",
+}
+ABOUT = {
+    "Conventions": "CF-1.11",
+    "source": f"dapple {VERSION}",
+    "history": f"made by dapple {VERSION}",
+}
 
 
 def time_coordinate(times: pd.DatetimeIndex) -> tuple[str, np.ndarray, dict[str, str]]:
@@ -24,7 +37,7 @@ def time_coordinate(times: pd.DatetimeIndex) -> tuple[str, np.ndarray, dict[str,
         Naive times.
     """
     naive = utc(times).tz_localize(None).to_numpy()
-    return "time", naive, {"long_name": "time", "time_zone": "UTC"}
+    return "time", naive, dict(TIME)
 
 
 def times(dataset: xr.Dataset, where: str | Path = "light dataset") -> pd.DatetimeIndex:
@@ -48,12 +61,14 @@ def times(dataset: xr.Dataset, where: str | Path = "light dataset") -> pd.Dateti
 def write(path: str | Path, dataset: xr.Dataset) -> None:
     """Write a dataset as NetCDF, whole or not at all.
 
-    Every variable must carry `units` and `long_name` (ValueError otherwise).
+    Every variable must carry `units` and `long_name` (ValueError otherwise), but for one that
+    describes the coordinate system.
     """
     bare = [
         str(name)
         for name, variable in dataset.data_vars.items()
         if not {"units", "long_name"} <= variable.attrs.keys()
+        and "grid_mapping_name" not in variable.attrs
     ]
     if bare:
         raise ValueError(f"{path}: no units or long_name on {', '.join(bare)}")
@@ -63,10 +78,15 @@ def write(path: str | Path, dataset: xr.Dataset) -> None:
 def store(path: str | Path, dataset: xr.Dataset, encoding: Mapping[Any, Mapping[str, Any]]) -> None:
     """Write NetCDF-4 with an encoding of each variable, whole or not at all.
 
-    The same dataset gives the same bytes.
+    The same dataset gives the same bytes. A title, if it has none, tells its first variable.
     """
+    first = next(iter(dataset.data_vars.values()), None)
+    title = str(first.attrs.get("long_name", first.name)) if first is not None else "nothing"
+    described = dataset.assign_attrs({"title": title} | ABOUT | dataset.attrs)
+    # Coordinates are never missing.
+    full = {name: {"_FillValue": None} for name in dataset.coords if name not in encoding}
     with atomic(path) as partial:
-        dataset.to_netcdf(partial, engine="netcdf4", encoding=encoding)
+        described.to_netcdf(partial, engine="netcdf4", encoding=full | dict(encoding))
 
 
 def read(

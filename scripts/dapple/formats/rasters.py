@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyproj
@@ -26,7 +27,7 @@ class Raster:
     pixel_m : float
         Edge of a pixel [m].
     crs : str
-        Coordinate system, as in "EPSG:25832".
+        Coordinate system, as in "EPSG:25832"; empty where it is not known.
     bands : tuple of str
         What each band is: a wavelength ("450") or a quantity ("height_m").
     """
@@ -97,27 +98,37 @@ def read(path: str | Path) -> Raster:
     return Raster(values.astype(np.float32), transform.c, transform.f, pixel_m, crs, bands)
 
 
-def write(path: str | Path, raster: Raster) -> None:
-    """Write a GeoTIFF of 32-bit floats, compressed, whole or not at all; NaN is its nodata."""
+def write(path: str | Path, raster: Raster, *, cloud_optimized: bool = False) -> None:
+    """Write a GeoTIFF of 32-bit floats, compressed, whole or not at all; NaN is its nodata.
+
+    With `cloud_optimized` it has overviews and the order of a COG, for maps that people look at.
+    """
     count, rows, columns = raster.values.shape
+    layout: dict[str, Any] = (
+        {"driver": "COG", "blocksize": 256, "predictor": "floating_point"}
+        if cloud_optimized
+        else {
+            "driver": "GTiff",
+            "tiled": True,
+            "blockxsize": 256,
+            "blockysize": 256,
+            "predictor": 3,
+        }
+    )
     with (
         atomic(path) as partial,
         rasterio.open(
             partial,
             "w",
-            driver="GTiff",
             height=rows,
             width=columns,
             count=count,
             dtype="float32",
-            crs=raster.crs,
+            crs=raster.crs or None,
             transform=Affine(raster.pixel_m, 0, raster.left_m, 0, -raster.pixel_m, raster.top_m),
             nodata=np.nan,
             compress="deflate",
-            predictor=3,
-            tiled=True,
-            blockxsize=256,
-            blockysize=256,
+            **layout,
         ) as file,
     ):
         file.write(raster.values.astype(np.float32))
@@ -146,7 +157,7 @@ def select(raster: Raster, bands: Sequence[str], where: str | Path) -> Raster:
 
 def same_crs(one: str, other: str) -> bool:
     """Whether two coordinate systems agree on east and north; heights are left out."""
-    return _horizontal(one).equals(_horizontal(other), ignore_axis_order=True)
+    return horizontal(one).equals(horizontal(other), ignore_axis_order=True)
 
 
 def require_overlap(
@@ -242,7 +253,8 @@ def _pixel(path: Path, transform) -> float:
     return float(transform.a)
 
 
-def _horizontal(crs: str) -> pyproj.CRS:
+def horizontal(crs: str | pyproj.CRS) -> pyproj.CRS:
+    """A coordinate system without its heights."""
     whole = pyproj.CRS(crs)
     return whole.sub_crs_list[0] if whole.is_compound else whole.to_2d()
 

@@ -15,7 +15,7 @@ from dapple import findings
 from dapple.errors import InputError
 from dapple.findings import Finding
 from dapple.formats.atomic import atomic
-from dapple.formats.rasters import same_crs
+from dapple.formats.rasters import horizontal, same_crs
 from dapple.formats.table_numbers import parse
 
 TREE_NAMES = ("tree", "tree_id", "id", "name", "label")
@@ -308,8 +308,7 @@ def _target(path: Path, frame: geopandas.GeoDataFrame, crs: str) -> pyproj.CRS:
             "a projected system in metres",
             "Reproject the crowns (ogr2ogr -t_srs).",
         )
-    whole = pyproj.CRS(crs or frame.crs)
-    return whole.sub_crs_list[0] if whole.is_compound else whole.to_2d()
+    return horizontal(crs or frame.crs)
 
 
 def _names(
