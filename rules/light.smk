@@ -4,6 +4,7 @@ Light: what arrives at the sensors.
 Needs   structure/{reconstruction}/, sky/sky.nc, sky/optics.nc, sky/sensors.csv; light/model.json where
         light.model is advised
 Makes   light/transport/{reconstruction}_{placement}.nc counted paths: any sky, spectrum and time
+        light/sun/{reconstruction}.nc                   what sensors see of the sun
         light/{reconstruction}.nc                       the series of all times
         light/timesteps/{reconstruction}/{batch}.nc     the independent check, some times in each file
         light/reference/{reconstruction}.nc             its series
@@ -201,7 +202,8 @@ if settings.light.engine == "transport":
             shade=SHADE,
             code=code("transport"),
         output:
-            transport=results("light/transport/{reconstruction}_{placement}.nc"),
+            # What it holds of sensors that are as they were is not traced again.
+            transport=update(results("light/transport/{reconstruction}_{placement}.nc")),
         log:
             logs("transport/{reconstruction}/{placement}"),
         benchmark:
@@ -247,6 +249,7 @@ if settings.light.engine == "transport":
             code=code("light"),
         output:
             light=results("light/{reconstruction}.nc"),
+            sun=update(results("light/sun/{reconstruction}.nc")),
         log:
             logs("light_{reconstruction}"),
         benchmark:

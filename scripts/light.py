@@ -2,10 +2,18 @@
 
 from dapple import steps
 from dapple.formats import georeference, json, netcdf, tables
-from dapple.light import light_datasets, placed_light, series, transport_files
+from dapple.light import (
+    by_sensor,
+    light_datasets,
+    placed_light,
+    series,
+    sun_files,
+    transport_files,
+)
 from dapple.light.light_model import Model, Tracing
 from dapple.scene import scene_files, scene_optics, sensors, traced
 from dapple.scene.facing import facing_of
+from dapple.sky.open_sky import towards_sun
 from dapple.streams import stream_seed
 from dapple.workflow import run
 
@@ -15,18 +23,35 @@ def main(snakemake):
     around = scene_files.around(inputs.ground or params.ground_z_m, inputs.shade)
     sky, optics = netcdf.read(inputs.sky), scene_optics.read(inputs.optics)
     table = tables.read(inputs.sensors)
-    sensors_m, facing = table[sensors.POSITION].to_numpy(), facing_of(table)
     model = Model(**(json.read(inputs.model) if inputs.model else {"bands": len(optics)}))
     tracing = Tracing(**params.tracing)
-    placements = []
-    for number, (leaves, counted) in enumerate(zip(inputs.leaves, inputs.transports, strict=True)):
-        scene = scene_files.read([leaves], inputs.wood, around)[0]
-        loaded, seed = traced.load(scene, params.variant), stream_seed(params.seed, number)
-        sunlit = steps.sun(loaded, sensors_m, sky, model, tracing, facing=facing, seed=seed)
-        paths = transport_files.read(counted)
-        placements.append(steps.products(sunlit, paths, sky, optics, model, tracing, facing))
+
+    def trace(some):
+        placements = []
+        for number, leaves in enumerate(inputs.leaves):
+            scene = traced.load(scene_files.read([leaves], inputs.wood, around)[0], params.variant)
+            where, seed = some[sensors.POSITION].to_numpy(), stream_seed(params.seed, number)
+            of_some = {"facing": facing_of(some), "keys": by_sensor.keys(some), "seed": seed}
+            placements.append(steps.sun(scene, where, sky, model, tracing, **of_some))
+        return sun_files.Suns.from_placements(placements)
+
+    files = [*inputs.leaves, inputs.wood, *inputs.code]
+    files += [path for path in (inputs.ground, inputs.shade) if path]
+    identities = by_sensor.identities(
+        table, files, model.sun, model.step_min, tracing, params.ground_z_m,
+        params.variant, params.seed, netcdf.times(sky).asi8, towards_sun(sky),
+    )  # fmt: skip
+    known = by_sensor.former(snakemake.output.sun, sun_files.read)
+    suns = by_sensor.completed(identities, known, table, trace)
+    placements = [
+        steps.products(
+            sunlit, transport_files.read(path)[1], sky, optics, model, tracing, facing_of(table)
+        )
+        for sunlit, path in zip(suns.placements, inputs.transports, strict=True)
+    ]
     light = light_datasets.as_dataset(series.mean(placements), table["sensor"], netcdf.times(sky))
     frame = georeference.read(inputs.cloud, inputs.registration, **params.world)
+    sun_files.write(snakemake.output.sun, suns, identities)
     netcdf.write(snakemake.output.light, placed_light.at_sensors(light, table, frame))
 
 

@@ -217,6 +217,7 @@ def sun(
     tracing: Tracing,
     *,
     facing: np.ndarray | None = None,
+    keys: np.ndarray | None = None,
     seed: int,
 ) -> Sunlit:
     """What sensors see of the sun at the times of a sky, traced as often as a model wants.
@@ -233,6 +234,8 @@ def sun(
     tracing : Tracing
     facing : (n, 3) float64 or None
         Unit normals of the sensors; None: they are level.
+    keys : (n,) uint32 or None
+        Which random numbers each sensor draws; None: those of its place in the list.
     seed : int
     """
     minutes = (times(sky) - times(sky)[0]).total_seconds().to_numpy() / 60
@@ -246,6 +249,7 @@ def sun(
         sun_diameter_deg=0.0 if model.sun == "point" else tracing.sun_diameter_deg,
         aperture_m=tracing.aperture_m,
         facing=facing,
+        keys=keys,
         seed=seed,
     )
     return interpolated(seen, minutes[chosen], minutes) if len(chosen) < len(minutes) else seen
@@ -259,6 +263,7 @@ def paths(
     *,
     optics: Optics | None = None,
     facing: np.ndarray | None = None,
+    keys: np.ndarray | None = None,
     seed: int,
 ) -> Transport:
     """Rays to the sky and paths back from the sensors, counted for any sky, spectrum and time.
@@ -276,6 +281,8 @@ def paths(
         rays are added until errors are small.
     facing : (n, 3) float64 or None
         Unit normals of the sensors; None: they are level.
+    keys : (n,) uint32 or None
+        Which random numbers each sensor draws; None: those of its place in the list.
     seed : int
     """
     growth = None
@@ -294,6 +301,7 @@ def paths(
         aperture_m=tracing.aperture_m,
         response=tracing.response,
         facing=facing,
+        keys=keys,
         seed=seed,
     )
 

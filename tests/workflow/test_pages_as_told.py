@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+import xarray as xr
 from tests.workflow.dry_runs import many
-from tests.workflow.project import ROOT, copy_of_project
+from tests.workflow.project import ROOT, copy_of_project, jobs
 
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 SHELL = re.compile(r"^```(?:sh|bash)?\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -82,16 +83,38 @@ def test_headings_of_messages_quote_messages_that_exist():
     assert [one for one in quoted if one not in source and one not in of_snakemake] == []
 
 
-def test_the_example_of_an_own_scan_runs_and_finds_the_light(tmp_path):
-    project = copy_of_project(tmp_path / "dapple", "config/example.yaml", experiment="example")
+@pytest.fixture(scope="module")
+def example(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("example") / "dapple"
+    project = copy_of_project(folder, "config/example.yaml", experiment="example")
     project.overrides = ("reconstructions=[polygons]", "light={check: false}")
     checked = project.run("check")
     assert "nothing speaks against this input" in checked
     project.run()
-    overall = pd.read_csv(project.result("statistics/overall.csv")).iloc[0]
+    return project
+
+
+def test_the_example_of_an_own_scan_runs_and_finds_the_light(example):
+    overall = pd.read_csv(example.result("statistics/overall.csv")).iloc[0]
     # The tree has flecks and clouds: a sky without it reaches 0.73.
     assert overall["r"] > overall["baseline_r"] + 0.15
     assert abs(overall["bias"]) < 30
-    summary = json.loads(project.result("structure/polygons/summary.json").read_text())
+    summary = json.loads(example.result("structure/polygons/summary.json").read_text())
     assert summary["leaf_area_m2"] == pytest.approx(8.0, rel=0.25)
-    assert "report.html" in {path.name for path in project.result("").iterdir()}
+    assert "report.html" in {path.name for path in example.result("").iterdir()}
+
+
+def test_a_sensor_more_in_the_table_is_traced_alone_and_changes_no_other(example):
+    light = example.result("light/polygons.nc")
+    before = xr.load_dataset(light)
+    table = example.folder / "config/example/sensors.csv"
+    lines = table.read_text().splitlines(keepends=True)
+    table.write_text("".join([*lines[:5], "new,0.1,0.3,0.1\n", *lines[5:]]))
+    done = example.run(light.relative_to(example.folder))
+    assert {"transport", "light"} <= jobs(done)
+    for step in ("transport/polygons/0", "light_polygons"):
+        log = example.result(f"logs/{step}.log").read_text()
+        assert f"1 of {len(lines)} sensors traced" in log
+    after = xr.load_dataset(light)
+    assert list(after["sensor"].to_numpy()[3:6]) == ["1_4", "new", "2_1"]
+    xr.testing.assert_identical(after.drop_sel(sensor="new"), before)

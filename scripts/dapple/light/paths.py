@@ -58,6 +58,7 @@ def trace(
     aperture_m: float = 0.0,
     response: Response = COSINE,
     facing: np.ndarray | None = None,
+    keys: np.ndarray | None = None,
 ) -> Paths:
     """Trace paths backward from sensors.
 
@@ -74,7 +75,7 @@ def trace(
         A path that meets more surfaces is given up (and counted as cut); at most 255, less in
         scenes of many kinds of surfaces (`Counters.check`).
     seed : int
-        Of the random numbers. A path depends on it, its point's index and its own number, not on
+        Of the random numbers. A path depends on it, its point's key and its own number, not on
         the number of threads nor on how many paths are traced.
     first : (n,) int64
         Number of each point's first path: to add to paths that were traced before.
@@ -86,6 +87,8 @@ def trace(
         Of the sensors.
     facing : (n, 3) float64 or None
         Unit normals of the sensors; None: they are level and look up.
+    keys : (n,) uint32 or None
+        Which random numbers each point draws; None: those of its place in the list.
 
     Returns
     -------
@@ -107,12 +110,13 @@ def trace(
         None if vectors is None else [mi.Float(vectors[:, k].astype(np.float32)) for k in range(3)]
         for vectors in (points_m, facing)
     )
+    keys = mi.UInt32((np.arange(len(points_m)) if keys is None else keys).astype(np.uint32))
     every = np.repeat(np.arange(len(points_m)), n_paths)
     parts = []
     for low in range(0, len(every), PATHS_PER_KERNEL):
         start = every[low : low + PATHS_PER_KERNEL]
         number = low + np.arange(len(start)) - (ends - n_paths - first)[start]
-        parts.append(_trace_block(scene, points, normals, start, number, response, *fixed))
+        parts.append(_trace_block(scene, points, normals, keys, start, number, response, *fixed))
     start, direction, orders, weight, cut = (
         np.concatenate([part[k] for part in parts]) for k in range(5)
     )
@@ -122,13 +126,13 @@ def trace(
 
 
 def _trace_block(
-    scene, points, normals, start, number, response, seed, max_orders, halved_after, radius
+    scene, points, normals, keys, start, number, response, seed, max_orders, halved_after, radius
 ):
     """Trace the paths of one kernel; those that were absorbed by chance are left out."""
     mi = scene.mi
     n = len(number)
     start, number = mi.UInt32(start.astype(np.uint32)), mi.UInt32(number.astype(np.uint32))
-    point, shift = mi.sample_tea_32(start, seed)
+    point, shift = mi.sample_tea_32(dr.gather(mi.UInt32, keys, start), seed)
     state, sequence = mi.sample_tea_32(point + number, shift)
     rng = mi.PCG32(initstate=mi.UInt64(state), initseq=mi.UInt64(sequence))
     flat = mi.warp.square_to_uniform_disk_concentric(_stratified(mi, point, shift, number))

@@ -35,6 +35,7 @@ def sun_rays(
     seed: int,
     aperture_m: float = 0.0,
     facing: np.ndarray | None = None,
+    keys: np.ndarray | None = None,
 ) -> SunRays:
     """Prepare rays from sensors' entrances to the sun's disc.
 
@@ -54,6 +55,8 @@ def sun_rays(
         Diameter of the entrance around each point; 0 is a point [m].
     facing : (n, 3) float64 or None
         Unit normals of the entrances; None: level ones.
+    keys : (n,) uint32 or None
+        As in `visibility.sunlit`.
 
     Returns
     -------
@@ -68,14 +71,16 @@ def sun_rays(
     radius = dr.opaque(mi.Float, float(np.sin(np.radians(0.5 * sun_diameter_deg))))
     half_aperture = dr.opaque(mi.Float, 0.5 * aperture_m)
     n_suns, key = dr.opaque(mi.UInt32, len(sun_directions)), dr.opaque(mi.UInt32, seed)
+    names = _names(mi, keys, len(points_m))
     dimensions = 4 if aperture_m else 2
 
     def block(pairs, pattern, n_replicates: int, n_rays: int):
         ray, item = _rays_of_block(mi, len(pairs), n_replicates * n_rays)
         pair = dr.gather(mi.UInt32, mi.UInt32(pairs.astype(np.uint32)), item)
-        per_set, sets = dr.opaque(mi.UInt32, n_rays), dr.opaque(mi.UInt32, n_replicates)
-        u = _shifted(mi, pattern, ray % per_set, pair * sets + ray // per_set, key)
         point, sun = pair // n_suns, pair % n_suns
+        per_set, sets = dr.opaque(mi.UInt32, n_rays), dr.opaque(mi.UInt32, n_replicates)
+        named = dr.gather(mi.UInt32, names, point) * n_suns + sun
+        u = _shifted(mi, pattern, ray % per_set, named * sets + ray // per_set, key)
         axis = mi.Vector3f(*(dr.gather(mi.Float, a, sun) for a in axes))
         start = mi.Point3f(*(dr.gather(mi.Float, a, point) for a in points))
         x, y = _disc(u[0], u[1])
@@ -107,6 +112,7 @@ def sky_rays(
     seed: int,
     response: Response = COSINE,
     facing: np.ndarray | None = None,
+    keys: np.ndarray | None = None,
 ) -> SkyRays:
     """Prepare rays from points to the patches of the sky.
 
@@ -124,6 +130,8 @@ def sky_rays(
         Of the sensors at the points.
     facing : (n, 3) float64 or None
         Unit normals of the sensors; None: they are level.
+    keys : (n,) uint32 or None
+        As in `visibility.sunlit`.
 
     Returns
     -------
@@ -150,18 +158,21 @@ def sky_rays(
     table = _columns(mi, np.stack([low, high - low, start, width], axis=1))
     weight = mi.Float(sky.solid_angle_sr / sky.seen_solid_angle_sr(response))
     n_patches, key = dr.opaque(mi.UInt32, sky.n), dr.opaque(mi.UInt32, seed)
+    names = _names(mi, keys, len(points_m))
 
-    def block(items, point, pattern, n_rays: int):
+    def block(items, per_point: int, pattern, n_rays: int):
         ray, number = _rays_of_block(mi, len(items), n_rays)
         item = dr.gather(mi.UInt32, mi.UInt32(items.astype(np.uint32)), number)
-        u = _shifted(mi, pattern, ray, item, key)
+        of_point = dr.opaque(mi.UInt32, per_point)
+        point = item // of_point
+        named = dr.gather(mi.UInt32, names, point) * of_point + item % of_point
+        u = _shifted(mi, pattern, ray, named, key)
         low, height, start, width = (
             dr.gather(mi.Float, column, item % n_patches) for column in table
         )
         level, up = sensor_response.height(drawn, dr.fma(u[0], height, low), dr)
         east, north = dr.sincos(dr.fma(u[1], width, start))
         way = mi.Vector3f(level * east, level * north, up)
-        point = dr.gather(mi.UInt32, mi.UInt32(point.astype(np.uint32)), number)
         origin = mi.Point3f(*(dr.gather(mi.Float, a, point) for a in points))
         seen = scene.transmittance(origin, way, way.z > 0)
         if normals is not None:
@@ -176,7 +187,7 @@ def sky_rays(
         items = (chosen[:, None] * per_point + np.arange(per_point)).ravel()
         sums = np.empty(len(items), np.float32)
         for part in _blocks(len(items), n_rays):
-            sums[part] = block(items[part], items[part] // per_point, pattern, n_rays)
+            sums[part] = block(items[part], per_point, pattern, n_rays)
         return sums.reshape(len(chosen), n_replicates, sky.n)
 
     return trace
@@ -253,6 +264,11 @@ class Tracer:
         dome = patches(1)
         trace = sky_rays(self.scene, points_m, dome, seed=seed, response=response, facing=facing)
         return trace(np.arange(len(points_m)), 1, 0, n)[:, 0, 0] / np.float32(n)
+
+
+def _names(mi, keys: np.ndarray | None, n: int):
+    """Which random numbers each of n points draws."""
+    return dr.arange(mi.UInt32, n) if keys is None else mi.UInt32(keys.astype(np.uint32))
 
 
 def _columns(mi, values: np.ndarray) -> list:

@@ -8,10 +8,11 @@ import xarray as xr
 
 from dapple.light.tensor import (
     Transport,
-    scattered_variance,
+    steadied,
     straight,
     summed_scattered,
     sun_radiance,
+    unevenness,
 )
 from dapple.light.visibility import Sunlit
 from dapple.scene.scene_optics import Optics
@@ -82,11 +83,12 @@ def compute(
         _from_sky(transport, sky.isel(time=slice(low, low + step)), optics, sun_kernel_deg)
         for low in range(0, n_times, step)
     ]
-    from_sky, scattered, variance = (
-        np.concatenate(part, axis=1) for part in zip(*blocks, strict=True)
+    from_sky, scattered, sky_variance, variance, uneven = (
+        np.concatenate(part, axis=-1) for part in zip(*blocks, strict=True)
     )
+    # Straight rays and paths are drawn independently, shadow rays too: their variances add.
+    variance = sky_variance + steadied(variance, scattered, uneven)
     beam = open_beam(sky, transport.response, facing)
-    # Shadow rays and paths are drawn independently: their variances add.
     return Light(
         direct=sunlit.share.mean(axis=0) * beam,
         sky=from_sky,
@@ -97,8 +99,8 @@ def compute(
 
 def _from_sky(
     transport: Transport, sky: xr.Dataset, optics: Optics, sun_kernel_deg: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Light straight from the sky, scattered light, the variance of their sum: (n, t) each."""
+) -> tuple[np.ndarray, ...]:
+    """Light straight from the sky, scattered light, variances of both (n, t); unevenness (t,)."""
     subdivision = patches(transport.n_patches)
     beam = sky["beam_normal_umol_m2_s"].transpose("time", "band").to_numpy()
     diffuse = sky["diffuse_horizontal_umol_m2_s"].transpose("time", "band").to_numpy()
@@ -108,10 +110,13 @@ def _from_sky(
     both = np.concatenate([radiance, spread]), np.concatenate([diffuse, beam])
     scattered = summed_scattered(transport, *both, optics)
     scattered = scattered[..., : len(beam)] + scattered[..., len(beam) :]
-    # Straight rays and paths are drawn independently: their variances add.
-    variance = from_sky.var(axis=1, ddof=1) / transport.n_replicates
-    variance += scattered_variance(scattered, transport.n_paths)
-    return from_sky.mean(axis=1), scattered.mean(axis=1), variance
+    whole = radiance * diffuse.sum(axis=1)[:, None] + spread * beam.sum(axis=1)[:, None]
+    return (
+        from_sky.mean(axis=1),
+        scattered.mean(axis=1),
+        *(light.var(axis=1, ddof=1) / transport.n_replicates for light in (from_sky, scattered)),
+        unevenness(whole, subdivision),
+    )
 
 
 def mean(placements: Sequence[Light]) -> Light:

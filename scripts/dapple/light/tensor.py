@@ -6,8 +6,9 @@ a radiance per patch, a spectrum a factor per event: light at every time and in 
 product of what was traced with both.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -25,6 +26,10 @@ NOMINAL_DIFFUSE_SHARE = 0.2
 """Of the light of the clear sky under which a pilot is judged."""
 NOMINAL_AUREOLE_DEG = 15.0
 """Standard deviation of the bright part of that sky around the sun."""
+
+
+OF_ROWS = ("replicate", "patch", "orders", "count")
+OF_SENSORS = ("sky_seen", "n_paths", "cut")
 
 
 @dataclass(frozen=True)
@@ -76,6 +81,28 @@ class Transport:
         """Subdivision of the sky."""
         return self.sky_seen.shape[2]
 
+    def of(self, sensors: np.ndarray) -> "Transport":
+        """Of the sensors with these numbers, in their order."""
+        bounds = np.searchsorted(self.sensor, np.arange(len(self.n_paths) + 1))
+        rows = np.concatenate([np.arange(bounds[k], bounds[k + 1]) for k in sensors])
+        number = np.repeat(np.arange(len(sensors), dtype=np.int32), np.diff(bounds)[sensors])
+        own: dict[str, Any] = {name: getattr(self, name)[rows] for name in OF_ROWS}
+        own |= {name: getattr(self, name)[sensors] for name in OF_SENSORS}
+        return replace(self, **own | {"sensor": number})
+
+    @classmethod
+    def joined(cls, parts: Sequence["Transport"]) -> "Transport":
+        """Of the sensors of all parts, one part after the other; traced in one scene."""
+        names = (*OF_ROWS, *OF_SENSORS)
+        own: dict[str, Any] = {
+            name: np.concatenate([getattr(part, name) for part in parts]) for name in names
+        }
+        before = np.cumsum([0, *(len(part.n_paths) for part in parts[:-1])])
+        own["sensor"] = np.concatenate(
+            [part.sensor + np.int32(n) for part, n in zip(parts, before, strict=True)]
+        )
+        return replace(parts[0], **own)
+
     def truncated_share(self, optics: Optics) -> np.ndarray:
         """(n_sensors,) what could be lost at `max_orders`, as a share of an even open sky.
 
@@ -108,8 +135,10 @@ def nominal_error(transport: Transport, optics: Optics, *, sun_kernel_deg: float
     beam = (1 - NOMINAL_DIFFUSE_SHARE) / suns[:, 2:]
     clear = clear + beam * sun_radiance(suns, sky, kernel_deg=sun_kernel_deg)
     flux = np.full((1 + len(suns), len(optics)), 1 / len(optics))
-    light = summed_scattered(transport, np.concatenate([overcast, clear]), flux, optics)
-    return _nominal_error(scattered_variance(light, transport.n_paths))
+    radiance = np.concatenate([overcast, clear])
+    light = summed_scattered(transport, radiance, flux, optics)
+    variance = light.var(axis=1, ddof=1) / transport.n_replicates
+    return _nominal_error(steadied(variance, light.mean(axis=1), unevenness(radiance, sky)))
 
 
 def nominal_straight_error(sky_seen: np.ndarray, response: Response = COSINE) -> np.ndarray:
@@ -128,30 +157,40 @@ def nominal_straight_error(sky_seen: np.ndarray, response: Response = COSINE) ->
     return _nominal_error(light.var(axis=1, ddof=1) / light.shape[1])
 
 
-def scattered_variance(light: np.ndarray, n_paths: np.ndarray) -> np.ndarray:
-    """Variance of scattered light, steadied by that of all sensors together.
+def unevenness(radiance: np.ndarray, sky: Patches) -> np.ndarray:
+    """(t,) mean square of skies' radiance (t, p) over its mean [per sr].
+
+    Light that comes back from a sensor leaves for all of the sky alike: the variance of what is
+    counted goes with this and with the mean.
+    """
+    total = radiance @ sky.solid_angle_sr
+    return np.divide(
+        radiance**2 @ sky.solid_angle_sr, total, out=np.zeros_like(total), where=total > 0
+    )
+
+
+def steadied(variance: np.ndarray, mean: np.ndarray, unevenness: np.ndarray) -> np.ndarray:
+    """Variance of scattered light, steadied by that of the same sensor under other skies.
 
     Parameters
     ----------
-    light : (n_sensors, r, t) float64
-        Of independent replicates.
-    n_paths : (n_sensors,) int64
-        Paths in each replicate.
+    variance, mean : (n_sensors, t) float64
+        Of the mean over replicates, and that mean.
+    unevenness : (t,) float64
+        Of the skies.
 
     Returns
     -------
     (n_sensors, t) float64
-        Of the mean over replicates. Few paths may bring most of a sensor's light; where none of
-        them was drawn, its replicates agree too well. The variance of counted light goes with its
-        mean over the number of paths: with the factor that all sensors share, this is worth as
-        many replicates as there are.
+        Few paths may bring most of a sensor's light; where none of them was drawn, its replicates
+        agree too well. The variance of counted light goes with its mean and the unevenness of the
+        sky: with the factor that all skies of a sensor share, this is worth as many replicates as
+        there are.
     """
-    n_replicates = light.shape[1]
-    own, mean = light.var(axis=1, ddof=1) / n_replicates, light.mean(axis=1)
-    paths = n_paths[:, None]
-    with np.errstate(invalid="ignore"):
-        factor = (own * paths).sum(axis=0) / mean.sum(axis=0)
-    return 0.5 * (own + np.nan_to_num(factor) * mean / paths)
+    even = np.divide(variance, unevenness, out=np.zeros_like(variance), where=unevenness > 0)
+    total = mean.sum(axis=1)
+    factor = np.divide(even.sum(axis=1), total, out=np.zeros_like(total), where=total > 0)
+    return 0.5 * (variance + factor[:, None] * unevenness * mean)
 
 
 def _nominal_error(variance: np.ndarray) -> np.ndarray:
@@ -195,9 +234,11 @@ def _straight(sky_seen: np.ndarray, radiance: np.ndarray, response: Response) ->
     """As `straight`, of the share of sky patches (n_sensors, r, p) that sensors see."""
     n_patches = sky_seen.shape[2]
     weight = radiance * patches(n_patches).seen_solid_angle_sr(response)
-    # One product of two matrices is much faster than many of a stack.
-    table = sky_seen.reshape(-1, n_patches).astype(np.float64) @ weight.T
-    return table.reshape(*sky_seen.shape[:2], -1)
+    light = np.empty((*sky_seen.shape[:2], len(radiance)))
+    for found, seen in zip(light, sky_seen, strict=True):
+        # One product of matrices each: much faster than a stack, and the same whatever its height.
+        np.matmul(seen.astype(np.float64), weight.T, out=found)
+    return light
 
 
 def scattered(transport: Transport, radiance: np.ndarray, optics: Optics) -> np.ndarray:
@@ -244,9 +285,9 @@ def summed_scattered(
     """
     result = np.zeros((*transport.sky_seen.shape[:2], len(radiance)))
     kinds, pieces = _by_kind(transport, radiance)
-    passed = transport.counters.spectral_factor(kinds, optics) @ flux.T
+    factor = transport.counters.spectral_factor(kinds, optics)
     for sensor, mine, light in pieces:
-        result[sensor] = np.einsum("rkt,kt->rt", light, passed[mine])
+        result[sensor] = np.einsum("rkt,kt->rt", light, factor[mine] @ flux.T)
     return result
 
 

@@ -60,6 +60,7 @@ def collect(
     aperture_m: float = 0.0,
     response: Response = COSINE,
     facing: np.ndarray | None = None,
+    keys: np.ndarray | None = None,
     n_replicates: int = N_REPLICATES,
 ) -> Transport:
     """Trace rays to the sky and paths from each sensor, in equal parts for every replicate.
@@ -82,7 +83,7 @@ def collect(
         Straight rays to the sky of each sensor at first, at least one to a patch and replicate.
     growth : Growth or None
         When more rays and paths are traced. None: the first are enough.
-    halved_after, aperture_m, response, facing
+    halved_after, aperture_m, response, facing, keys
         See `paths.trace`. Rays to the sky start at the middle of the aperture.
     n_replicates : int
         Independent sets, at least 2.
@@ -90,13 +91,19 @@ def collect(
     Returns
     -------
     Transport
-        The same for the same seed, whatever the number of threads.
+        The same for the same seed, whatever the number of threads. What is found of a sensor does
+        not depend on the others.
     """
     sky = patches(n_patches)
+    of_sensors: dict[str, Any] = {"response": response, "facing": facing, "keys": keys}
+    of_starts: dict[str, Any] = {"facing": None, "keys": None, "response": response}
+    if facing is not None:
+        of_starts["facing"] = np.repeat(facing, n_replicates, axis=0)
+    if keys is not None:
+        of_starts["keys"] = np.add.outer(keys * n_replicates, np.arange(n_replicates)).ravel()
 
     def look(done: np.ndarray, wanted: np.ndarray, seen: np.ndarray | None) -> np.ndarray:
-        seed_of_sky = stream_seed(seed, "sky")
-        rays = sky_rays(scene, sensors_m, sky, seed=seed_of_sky, response=response, facing=facing)
+        rays = sky_rays(scene, sensors_m, sky, seed=stream_seed(seed, "sky"), **of_sensors)
         if seen is None:
             seen = np.zeros((len(sensors_m), n_replicates, sky.n), np.float32)
         for number, target in sorted({*zip(done.tolist(), wanted.tolist(), strict=True)}):
@@ -116,8 +123,7 @@ def collect(
             seed=stream_seed(seed, "paths"),
             halved_after=halved_after,
             aperture_m=aperture_m,
-            response=response,
-            facing=None if facing is None else np.repeat(facing, n_replicates, axis=0),
+            **of_starts,
         )
         more = _tallied(paths, scene.counters, wanted - done, seen, max_orders, response)
         return more if counted is None else _added(counted, more)

@@ -22,11 +22,20 @@ SENSORS = {
     "n_paths": "paths started from the sensor in each replicate",
     "cut": "paths given up at max_orders, of all replicates",
 }
+IDENTITY = "what the sensor's light depends on, as a number"
 SKY = "what the sensor reads of the sky patch over what a level one in the open reads of it"
 
 
-def write(path: str | Path, transport: Transport) -> None:
-    """Write counted paths, whole or not at all; the same counts give the same bytes."""
+def write(path: str | Path, transport: Transport, identities: np.ndarray) -> None:
+    """Write counted paths, whole or not at all; the same counts give the same bytes.
+
+    Parameters
+    ----------
+    path : path
+    transport : Transport
+    identities : (n_sensors,) uint64
+        Of its sensors, see `by_sensor.identities`.
+    """
     variables: dict[str, tuple[Any, np.ndarray, dict[str, str]]] = {
         name: (
             ("row", "order") if name == "orders" else "row",
@@ -39,6 +48,7 @@ def write(path: str | Path, transport: Transport) -> None:
         name: ("start", getattr(transport, name), {"units": "1", "long_name": text})
         for name, text in SENSORS.items()
     }
+    variables["identity"] = ("start", identities, {"units": "1", "long_name": IDENTITY})
     about = {"units": "1", "long_name": SKY}
     variables["sky_seen"] = (("start", "set", "sky_patch"), transport.sky_seen, about)
     variables["orders"][2]["long_name"] += ": " + ", ".join(transport.counters.names)
@@ -51,8 +61,8 @@ def write(path: str | Path, transport: Transport) -> None:
     netcdf.store(path, dataset, dict.fromkeys(variables, compressed))
 
 
-def read(path: str | Path) -> Transport:
-    """Read counted paths as `write` writes them.
+def read(path: str | Path) -> tuple[np.ndarray, Transport]:
+    """Read identities of sensors and counted paths as `write` writes them.
 
     Raises
     ------
@@ -60,10 +70,10 @@ def read(path: str | Path) -> Transport:
         No such file, or one of another kind.
     """
     names = [*ROWS, *SENSORS, "sky_seen"]
-    dataset = netcdf.read(path, names, ("max_orders", *KINDS))
+    dataset = netcdf.read(path, [*names, "identity"], ("max_orders", *KINDS))
     columns = {name: dataset[name].to_numpy() for name in names}
     counters = Counters.from_attributes(dataset.attrs)
-    return Transport(
+    return dataset["identity"].to_numpy(), Transport(
         **columns,
         max_orders=int(dataset.attrs["max_orders"]),
         counters=counters,

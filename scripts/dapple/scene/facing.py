@@ -14,6 +14,6 @@ def facing_of(sensors: pd.DataFrame) -> np.ndarray | None:
     sensors : pandas.DataFrame
         With `tilt_deg` and `azimuth_deg` where any is tilted; see `scene.sensors.turned`.
     """
-    if "tilt_deg" not in sensors:
+    if "tilt_deg" not in sensors or not sensors["tilt_deg"].any():
         return None
     return direction_from_angles(sensors["tilt_deg"].to_numpy(), sensors["azimuth_deg"].to_numpy())
