@@ -26,6 +26,14 @@ CLEAR = (
     "%d.%m.%y %H:%M:%S",
     "%d.%m.%Y %H.%M",
     "%d.%m.%Y %H.%M.%S",
+    "%Y-%m-%d %H.%M",
+    "%Y-%m-%d %H.%M.%S",
+    "%Y-%m-%d %I:%M %p",
+    "%Y-%m-%d %I:%M:%S %p",
+    "%Y/%m/%d %I:%M %p",
+    "%Y/%m/%d %I:%M:%S %p",
+    "%d.%m.%Y %I:%M %p",
+    "%d.%m.%Y %I:%M:%S %p",
     "%Y%m%d%H",
     "%d-%b-%Y %H:%M",
     "%d-%b-%Y %H:%M:%S",
@@ -41,6 +49,8 @@ DAY_FIRST, MONTH_FIRST = (
     [f"{date}{year} {clock}" for clock in CLOCKS for year in ("%Y", "%y")]
     for date in ("%d/%m/", "%m/%d/")
 )
+HALF_DAY = r"(?<=\d)\s*([AaPp])(?:\.?\s?[Mm])?\.?$"
+"""AM, p.m. and a behind a time."""
 FIRST_YEAR, LAST_YEAR = 1950, 2100
 
 
@@ -63,8 +73,14 @@ def naive(text: pd.Series, where: str, time_format: str = "") -> pd.DatetimeInde
     """
     if time_format:
         return _declared(text, where, time_format)
-    plain, next_day = _midnights(text.str.replace("T", " ").str.replace(",", "."))
-    found = _first_of([ISO, *CLEAR], plain)
+    plain = (
+        text.str.replace(r"(?<=\d)T(?=\d)", " ", regex=True)
+        .str.replace(r",(?=\s)", "", regex=True)
+        .str.replace(",", ".")
+    )
+    plain = plain.str.replace(HALF_DAY, r" \1M", regex=True).str.upper()
+    plain, next_day = _midnights(plain)
+    found = _first_of([ISO, *CLEAR], plain)[1]
     if found is None:
         # 8/10/2023 and 8-10-2023: which is the day?
         slashed = plain.str.replace(r"^(\d{1,2})-(\d{1,2})-(\d{2,4})", r"\1/\2/\3", regex=True)
@@ -83,7 +99,8 @@ def _declared(text: pd.Series, where: str, time_format: str) -> pd.DatetimeIndex
         times = pd.to_datetime(numbers, unit=unit, origin=origin, errors="coerce")
         times = times.dt.round("s") if time_format == "excel" else times
     else:
-        plain, next_day = _midnights(text)
+        plain = text.str.replace(HALF_DAY, r" \1M", regex=True) if "%p" in time_format else text
+        plain, next_day = _midnights(plain)
         times = pd.to_datetime(plain, format=time_format, errors="coerce")
         times = times + pd.to_timedelta(next_day.astype(int), unit="D")
     if (wrong := times.isna()).any():
@@ -103,7 +120,8 @@ def _midnights(text: pd.Series) -> tuple[pd.Series, pd.Series]:
     return plain, is_24
 
 
-def _first_of(formats: list[str], text: pd.Series) -> pd.Series | None:
+def _first_of(formats: list[str], text: pd.Series) -> tuple[str, pd.Series | None]:
+    """The first format in which every row is a time, and these times."""
     for one in formats:
         if one == ISO and not text.str.match(r"^\d{4}-\d{2}-\d{2}").all():
             continue  # "20230810" alone, or a number, is not meant
@@ -112,13 +130,14 @@ def _first_of(formats: list[str], text: pd.Series) -> pd.Series | None:
             continue  # their number tells the format: 2023081010 is no 01:00
         times = pd.to_datetime(text, format=one, errors="coerce")
         if times.notna().all() and times.dt.year.between(FIRST_YEAR, LAST_YEAR).all():
-            return times
-    return None
+            return one, times
+    return "", None
 
 
 def _day_or_month(text: pd.Series, where: str) -> pd.Series | None:
     """The one order of day and month in which the rows are times, steps considered."""
-    day, month = _first_of(DAY_FIRST, text), _first_of(MONTH_FIRST, text)
+    by_day, day = _first_of(DAY_FIRST, text)
+    by_month, month = _first_of(MONTH_FIRST, text)
     if day is None or month is None or day.equals(month):
         return month if day is None else day
     longest = [times.sort_values().diff().max() for times in (day, month)]
@@ -128,8 +147,8 @@ def _day_or_month(text: pd.Series, where: str) -> pd.Series | None:
         where,
         f"{text.iloc[0]}, which may be {day.iloc[0]:%d %B %Y} or {month.iloc[0]:%d %B %Y}",
         "a day and a month that can be told apart",
-        "Write times in ISO 8601 (2023-08-10 10:10:00), or set `time_format`, for example "
-        "'%d/%m/%Y %H:%M'.",
+        f"Set `time_format` of this table to '{by_day}' or to '{by_month}', or write times in "
+        "ISO 8601 (2023-08-10 10:10:00).",
     )
 
 

@@ -1,5 +1,6 @@
 """The times of a run: aware of their zone, or an error; nothing is guessed."""
 
+import re
 from collections.abc import Sequence
 from datetime import datetime, tzinfo
 from pathlib import Path
@@ -18,6 +19,9 @@ OFFSET = (
 )
 
 
+STAMP = r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d"
+MOST_OFFSETS = 4
+"""Of one table: 10:00-10:10 is an interval, and its end is no offset."""
 AHEAD = {"start": 0.5, "middle": 0.0, "instant": 0.0, "end": -0.5}
 """From a stamp to the middle of its interval, in intervals, by what the stamp marks."""
 
@@ -117,8 +121,8 @@ def _naive(where: str, time: object, beside: str = "") -> InputError:
         where,
         f"the naive timestamp {time}{beside}".strip(),
         "a time zone",
-        "Declare the zone in which the times were written, for example 'UTC' or "
-        "'Europe/Berlin', or write the offset into them (2023-08-10T12:30:00+02:00).",
+        "Declare the zone in which the times were written as `timezone` of this table, for example "
+        "'UTC' or 'Europe/Berlin', or write the offset into them (2023-08-10T12:30:00+02:00).",
     )
 
 
@@ -127,6 +131,14 @@ def _offsets(text: pd.Series, where: str) -> tuple[pd.Series, pd.Series]:
     spelled_out = text.str.extract(OFFSET)
     zone = spelled_out["offset"].fillna(spelled_out["name"])
     minutes = pd.Series(np.nan, index=text.index)
+    if zone.nunique() > MOST_OFFSETS:
+        raise InputError(
+            where,
+            f"{text.iloc[0]}, {text.iloc[1]} and more, with {zone.nunique()} different offsets",
+            "one time in each cell",
+            "Where a cell holds the start and the end of an interval, keep the start and set "
+            "`interval_label: start`.",
+        )
     for spelled in zone.dropna().unique():
         found = timezones.find_timezone(spelled, where).utcoffset(datetime(2023, 1, 1))
         minutes[zone == spelled] = found.total_seconds() / 60.0 if found is not None else np.nan
@@ -146,7 +158,8 @@ def _localize(index: pd.DatetimeIndex, zone: tzinfo, where: str, name: str) -> p
         offset = min(seasons, key=lambda day: day.utcoffset()).strftime("%z")
         raise InputError(
             where,
-            f"a time that daylight saving makes ambiguous or skips ({error})",
+            "a time that daylight saving makes ambiguous or skips "
+            f"({stamp[0] if (stamp := re.search(STAMP, str(error))) else error})",
             f"wall-clock times that exist once in {name}",
             "If the clock stayed on winter time, declare its offset, here "
             f"'{offset[:3]}:{offset[3:]}'; else write the times in UTC.",

@@ -32,8 +32,8 @@ def short(path: Path) -> str:
 def run(main: Callable[[Any], None], snakemake: Any) -> None:
     """Run the main function of a script with its output in the rule's log.
 
-    A mistake of the user's (`InputError`) is one message on the terminal; everything else is a
-    traceback in the log and on the terminal. Both end the job.
+    A mistake of the user's (`InputError`) is one message in the log and on the terminal; everything
+    else is a traceback in both. Both end the job.
     """
     with Path(snakemake.log[0]).open("w", buffering=1) as log:
         try:
@@ -41,7 +41,7 @@ def run(main: Callable[[Any], None], snakemake: Any) -> None:
                 main(snakemake)
         except InputError as error:
             message = f"dapple: {error}"
-            log.write(f"{traceback.format_exc()}\n{message}\n")
+            log.write(f"{message}\n")
             sys.exit(message)
         except Exception:
             log.write(traceback.format_exc())

@@ -7,6 +7,8 @@ from collections.abc import Iterable
 UNIT_IN_HEADER = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*$")
 UNIT_AT_END = re.compile(r"^(?P<name>.+?)\s*(?:,|\s-)\s+(?P<unit>[^,]+)$")
 """`Solar Rad. - W/m^2`, `PAR, uE`."""
+SERIAL = re.compile(r"\s*\([^()]*:[^()]*\)\s*$")
+"""What Onset's loggers add: `(LGR S/N: 1, SEN S/N: 2)`."""
 UNIT_BEHIND = re.compile(r"[_ ]+k?w[_/ ]?m\^?-?[2²]$", re.IGNORECASE)
 """`ghi_wm2`."""
 OF_MEANS = re.compile(r"[_ .](avg|average|mean|mittel|tot|sum)\d*$", re.IGNORECASE)
@@ -19,6 +21,11 @@ TIME = ("time_utc", "time", "timestamp", "datetime", "date_time", "date time", "
         "fecha hora", "fechahora", "data/ora", "data ora", "data/hora", "reference_timestamp",
         "observation_time", "record_time", "tmstamp", "unix_time", "unixtime", "epoch")  # fmt: skip
 """Columns of whole time stamps, the likeliest first."""
+START = ("start", "from", "start_time", "start_date", "begin", "beginn", "anfang", "von", "debut",
+         "inicio", "inizio", "desde", "interval_start", "period_start")  # fmt: skip
+END = ("end", "to", "end_time", "end_date", "stop", "ende", "bis", "fin", "fine", "fim", "hasta",
+       "interval_end", "period_end")  # fmt: skip
+"""Columns that together tell the interval of a row."""
 DATE = ("date", "datum", "fecha", "data", "dato", "day", "date_utc", "date_local", "yyyymmdd",
         "local_date")  # fmt: skip
 CLOCK = ("time", "clock", "uhrzeit", "zeit", "heure", "hora", "ora", "tid", "time_utc",
@@ -33,7 +40,9 @@ MINUTE = ("minute", "minutes", "min", "mi", "mn")
 
 GLOBAL = ("global_W_m2", "global", "ghi", "globalstrahlung", "global_radiation",
           "global_irradiance", "global_horizontal", "global_horizontal_irradiance",
-          "global_solar_radiation", "globalstr", "rayonnement_global", "radiacion_global",
+          "global_solar_radiation", "globalstr", "global_rad", "glo", "solarstrahlung",
+          "sonnenstrahlung", "rayonnement_solaire", "radiacion_solar", "radiazione_solare",
+          "radiacao_solar", "rayonnement_global", "radiacion_global",
           "radiacao_global", "radiazione_globale", "globalstraling", "globalstraalning",
           "sw_in", "sw_in_f", "swin", "sw_down", "swdown", "sw_dn", "swd", "rsds", "ssrd",
           "dw_solar", "shortwave_in", "shortwave_down", "shortwave_radiation",
@@ -41,7 +50,7 @@ GLOBAL = ("global_W_m2", "global", "ghi", "globalstrahlung", "global_radiation",
           "incoming_shortwave_radiation", "solar_radiation", "solar_rad", "solar_irradiance",
           "solar", "slrw", "srad", "solrad", "sol_rad", "strahlung", "rg", "rs", "rsd", "k_down",
           "kdown", "cglo", "gre000z0", "gre000h0", "allsky_sfc_sw_dwn", "pyranometer", "radiation",
-          "irradiance")  # fmt: skip
+          "irradiance", "total")  # fmt: skip
 DIFFUSE = ("diffuse_W_m2", "diffuse", "dhi", "diffus", "diffusstrahlung", "diffuse_radiation",
            "diffuse_irradiance", "diffuse_horizontal", "diffuse_horizontal_irradiance",
            "diffuse_solar_radiation", "diffuse_hemispherical", "himmelsstrahlung",
@@ -49,7 +58,9 @@ DIFFUSE = ("diffuse_W_m2", "diffuse", "dhi", "diffus", "diffusstrahlung", "diffu
            "radiazione_diffusa", "sw_dif", "sw_diffuse", "dif", "diff", "rd", "rdif", "k_diffuse",
            "chim", "allsky_sfc_sw_diff", "ods000z0", "ods000h0")  # fmt: skip
 PAR = ("par_umolm2s", "par_umol_m2_s", "par", "ppfd", "ppfd_in", "par_in", "par_down", "qpar",
-       "ppf",       "photon_flux", "photon_flux_density", "photosynthetic_photon_flux_density",
+       "ppf", "photon_flux", "photon_flux_density", "photosynthetic_photon_flux", "par_den",
+       "par_flux", "par_flux_density", "quantum_flux", "ppfd_umol", "par_umol",
+       "photosynthetic_photon_flux_density",
        "photosynthetically_active_radiation", "quantum", "parlite")  # fmt: skip
 SENSOR = ("sensor", "label", "sensor_id", "sensor_label", "sensor_name")
 
@@ -57,9 +68,10 @@ SENSOR = ("sensor", "label", "sensor_id", "sensor_label", "sensor_name")
 def plain(name: str) -> str:
     """A name without its unit, accents and signs, in small letters: `Globalstrahlung [W/m²]` and
     `GLOBALSTRAHLUNG_Avg` are `globalstrahlung`."""
-    for pattern in (UNIT_IN_HEADER, UNIT_AT_END):
-        if match := pattern.match(name.strip()):
-            name = match["name"]
+    while match := UNIT_IN_HEADER.match(name.strip()):  # `Solar Radiation (W/m²) (S-LIB:1)`
+        name = match["name"]
+    if match := UNIT_AT_END.match(name.strip()):
+        name = match["name"]
     name = OF_MEANS.sub("", UNIT_BEHIND.sub("", name.strip()))
     letters = unicodedata.normalize("NFKD", name.replace("ß", "ss")).lower()
     return re.sub(r"[^a-z0-9]", "", letters)

@@ -174,7 +174,20 @@ def _pvgis(path: Path, lines: Sequence[str]) -> Table | None:
             path, "no line that begins with `time`", "PVGIS's CSV", "Download it again."
         )
     end = next((k for k in range(header, len(lines)) if not lines[k].strip()), len(lines))
+    slope = re.search(r"Slope:\s*(-?[\d.]+)", "\n".join(lines[:header]))
     table = build(path, lines[:end], header=header, delimiter=",", layout="PVGIS")
+    return of_pvgis(table, float(slope[1]) if slope else 0.0)
+
+
+def of_pvgis(table: Table, slope_deg: float) -> Table:
+    """What is fixed of PVGIS's table on a plane of this slope.
+
+    Raises
+    ------
+    InputError
+        A tilted plane, or no column of radiation.
+    """
+    path = table.path
     time = str(table.cells.columns[0])
     facts: dict[str, Any] = {"timezone": "UTC", "interval_min": 0.0}
     beam = "Gb(i)" in table.cells and "Gd(i)" in table.cells
@@ -187,10 +200,9 @@ def _pvgis(path: Path, lines: Sequence[str]) -> Table | None:
         known = there(table, **{"global": "G(h)", "diffuse": "Gd(h)"})
         return replace(table, units=dict.fromkeys(known.values(), "W/m2"),
                        known=known | {"time": time}, **facts)  # fmt: skip
-    slope = re.search(r"Slope:\s*(-?[\d.]+)", "\n".join(lines[:header]))
-    if slope and float(slope[1]) != 0:
+    if slope_deg:
         raise InputError(
-            path, f"radiation on a plane that is tilted by {slope[1]}°", "on the horizontal",
+            path, f"radiation on a plane that is tilted by {slope_deg:g}°", "on the horizontal",
             "Download it with slope 0.",
         )  # fmt: skip
     cells = table.cells
@@ -295,7 +307,11 @@ def _open_meteo(path: Path, lines: Sequence[str]) -> Table | None:
     if head is None:
         return None
     table = build(path, lines, header=head, delimiter=",", layout="Open-Meteo")
-    seconds = table_numbers.plain(facts.get("utc_offset_seconds", "0")) or 0.0
+    return of_open_meteo(table, table_numbers.plain(facts["utc_offset_seconds"]) or 0.0)
+
+
+def of_open_meteo(table: Table, seconds: float) -> Table:
+    """What is fixed of Open-Meteo's table, so many seconds east of Greenwich."""
     roles = {"global": "shortwave_radiation", "diffuse": "diffuse_radiation"}
     known = {role: column for role, name in roles.items() if (column := table.find([name]))}
     is_known = abs(seconds) <= 14 * 3600

@@ -12,13 +12,16 @@ from dapple.errors import InputError
 MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "missing", "-", "--", "---", "inf",
                      "-inf", "#n/v", "#n/a", "#nv", "#value!", "#wert!", "#div/0!", "#ref!", "?",
                      "*", "m", "/", "//", "///", "\\n", "–", "—", "n.a.", "nd", "n.d.", "k.a.",
-                     "nat", "no data", "nodata", "err", "error"})  # fmt: skip
+                     "nat", "no data", "nodata", "err", "error", ".", "no value", "invalid",
+                     "ovrng", "1.#qnan", "-1.#ind", "1.#inf", "#num!", "#null!"})  # fmt: skip
 """Texts that stand for a missing value, in small letters."""
 
 # A sign, digits with separators, an exponent; then, perhaps, a unit.
 NUMBER = re.compile(
     r"^(?P<number>[+\-−]?(?:\d[\d.,'’]*|[.,]\d+)(?:[eE][+-]?\d+)?)(?P<unit>\s*[^\d\s.,'’:/-][^\d:]*)?$"
 )
+FILLED = re.compile(r"\*{2,}|#{2,}")
+"""Stars or hashes: a value that did not fit its cell."""
 GROUPS = {sign: re.compile(rf"^[+-]?\d{{1,3}}(?:{re.escape(sign)}\d{{3}})+$") for sign in ".,"}
 
 
@@ -125,7 +128,7 @@ def parse(
     is_missing = np.zeros(len(texts), bool)
     units: dict[str, str] = {}
     for k, text in enumerate(texts):
-        if text.strip().lower() in words:
+        if text.strip().lower() in words or FILLED.fullmatch(text.strip()):
             is_missing[k] = True
             continue
         match = NUMBER.match(_joined(text))

@@ -10,8 +10,7 @@ import numpy as np
 import pandas as pd
 
 from dapple.errors import InputError
-from dapple.formats import column_names, table_numbers
-from dapple.formats.column_names import UNIT_IN_HEADER
+from dapple.formats import column_names, table_numbers, units
 from dapple.formats.table_numbers import Numbers
 
 JOINED_TIME = "time"
@@ -221,7 +220,14 @@ def _names(row: list[str]) -> tuple[list[str], dict[str, str], frozenset[str]]:
         name if name not in named[:k] else f"{name} (column {k + 1})"
         for k, name in enumerate(named)
     ]
-    found = {name: UNIT_IN_HEADER.match(name) for name in names}
-    in_header = {name: match["unit"].strip() for name, match in found.items() if match}
-    units = {name: unit for name, unit in in_header.items() if not unit.isdigit()}
-    return names, units, repeated
+    found = {name: _unit_of(name) for name in names}
+    return names, {name: unit for name, unit in found.items() if unit}, repeated
+
+
+def _unit_of(name: str) -> str:
+    """The unit in the name of a column: in brackets, or known and behind a comma or a dash."""
+    name = column_names.SERIAL.sub("", name)
+    if match := column_names.UNIT_IN_HEADER.match(name):
+        return "" if match["unit"].strip().isdigit() else match["unit"].strip()
+    match = column_names.UNIT_AT_END.match(name)
+    return match["unit"] if match and units.named(match["unit"]) else ""

@@ -14,6 +14,10 @@ TOGETHER = " + "
 """Between the names of columns that make a time together, in configurations and messages."""
 
 
+DAY_WITH_CLOCK = r".*\d[T ]+\d{1,2}[:.h]\d\d.*|\d{10}|\d{12}|\d{14}"
+"""Of cells in a column that is called after days: they tell the time of the day too."""
+
+
 @dataclass(frozen=True)
 class Times:
     """Times of a table, as text.
@@ -55,6 +59,8 @@ def of(table: Table, declared: str, key: str) -> Times:
         return _joined(table, apart)
     if column := table.find(column_names.TIME):
         return _joined(table, [column])
+    if (column := table.find(column_names.DATE)) and _all_like(table, column, DAY_WITH_CLOCK):
+        return _joined(table, [column])
     return _of_parts(table) or _joined(table, [table.require(column_names.TIME[:3], key)])
 
 
@@ -66,7 +72,7 @@ def _day_and_clock(table: Table) -> list[str]:
         if column and column != day and _all_like(table, column, r"\d{1,2}[:.h]\d{2}.*|\d{3,4}"):
             clock = column
             break
-    if day is None or clock is None:
+    if day is None or clock is None or _all_like(table, day, DAY_WITH_CLOCK):
         return []
     if not _all_like(table, day, r"[^\s]*\d[^\s:]*|\d{1,2} \w+ \d{4}"):
         return []
@@ -90,15 +96,21 @@ def _joined(table: Table, columns: list[str]) -> Times:
 
 
 def _of_parts(table: Table) -> Times | None:
-    """Year, month and day, or day of the year; hour and minute, or both in one number."""
-    year = table.find(column_names.YEAR)
+    """A day with hours, or year, month and day or day of the year; hour and minute, or both."""
+    year, date = table.find(column_names.YEAR), table.find(column_names.DATE)
+    whole_hour = table.find(column_names.HOUR)
+    if date and whole_hour and not year and _all_like(table, whole_hour, r"\d{1,2}"):
+        minute = table.find(column_names.MINUTE)
+        clock = _whole(table, whole_hour, 2) + ":" + (_whole(table, minute, 2) if minute else "00")
+        names = [date, whole_hour, *([minute] if minute else [])]
+        return Times((table.text(date) + " " + clock).rename(TOGETHER.join(names)), None)
     day_of_year = table.find(column_names.DAY_OF_YEAR)
     month, day = table.find(column_names.MONTH), table.find(column_names.DAY_OF_MONTH)
     if year is None or not (day_of_year or (month and day)):
         return None
     hour, minute = table.find(column_names.HOUR), table.find(column_names.MINUTE)
-    clock = table.find(("hhmm", "time"))
-    if hour is None and clock is None:
+    four_digits = table.find(("hhmm", "time"))
+    if hour is None and four_digits is None:
         return None
     if day_of_year:
         names = [year, day_of_year]
@@ -115,8 +127,8 @@ def _of_parts(table: Table) -> Times | None:
         minutes = _whole(table, minute, 2) if minute else "00"
         text = text + " " + _whole(table, hour, 2) + ":" + minutes
     else:
-        names.append(str(clock))
-        four = _whole(table, str(clock), 4)
+        names.append(str(four_digits))
+        four = _whole(table, str(four_digits), 4)
         text = text + " " + four.str[:2] + ":" + four.str[2:]
     return Times(text.rename(TOGETHER.join(names)), None)
 

@@ -10,11 +10,13 @@ from dapple.findings import Finding
 SUNLIGHT_UMOL_PER_J = 4.57
 """Photons of 400 to 700 nm in a joule of sunlight of that range (Thimijan and Heins 1983)."""
 
-POWERS = {"W/m2": 1.0, "kW/m2": 1e3, "mW/cm2": 10.0}
+POWERS = {"W/m2": 1.0, "kW/m2": 1e3, "mW/cm2": 10.0, "cal/cm2/min": 4.184e4 / 60}
 """Irradiance in W m⁻²."""
-ENERGIES = {"J/m2": 1.0, "kJ/m2": 1e3, "MJ/m2": 1e6, "J/cm2": 1e4, "Wh/m2": 3.6e3, "kWh/m2": 3.6e6}
+ENERGIES = {"J/m2": 1.0, "kJ/m2": 1e3, "MJ/m2": 1e6, "J/cm2": 1e4, "Wh/m2": 3.6e3, "kWh/m2": 3.6e6,
+            "cal/cm2": 4.184e4}  # fmt: skip
 """Sums over an interval, in J m⁻²."""
-PHOTONS = {"umol/m2/s": 1.0, "mmol/m2/s": 1e3, "W/m2": SUNLIGHT_UMOL_PER_J}
+PHOTONS = {"umol/m2/s": 1.0, "mmol/m2/s": 1e3, "mol/m2/d": 1e6 / 86_400,
+           "W/m2": SUNLIGHT_UMOL_PER_J}  # fmt: skip
 """Photon flux of 400 to 700 nm in µmol m⁻² s⁻¹; W/m2: of PAR."""
 PHOTON_SUMS = {"mol/m2": 1e6, "mmol/m2": 1e3}
 """Sums over an interval, in µmol m⁻²."""
@@ -24,7 +26,8 @@ PHOTON_FLUXES = (*PHOTONS, *PHOTON_SUMS)
 
 # After `_squeezed`: powers, signs and blanks away.
 SPELLINGS = {
-    "W/m2": ("wm2", "watt", "watts", "w", "watt/m2"),
+    "W/m2": ("wm2", "watt", "watts", "w", "wattm2", "wattsm2", "wsqm", "wattspersquaremeter",
+             "wattspersquaremetre", "wattpersquaremeter", "wattpersquaremetre"),
     "kW/m2": ("kwm2", "kw"),
     "mW/cm2": ("mwcm2",),
     "J/m2": ("jm2",),
@@ -34,14 +37,25 @@ SPELLINGS = {
     "Wh/m2": ("whm2", "whrm2"),
     "kWh/m2": ("kwhm2", "kwhrm2"),
     "umol/m2/s": ("umolm2s", "umolm2s1", "umolsm2", "umols1m2", "umol", "ue", "uem2s", "uem2s1",
-                  "ueinstein", "umolphotonsm2s", "umolphotonsm2s1", "ppfd"),
+                  "ueinstein", "ueinsteinm2s", "ueinsteinm2s1", "umolphotonsm2s",
+                  "umolphotonsm2s1", "micromolm2s", "micromolm2s1", "micromolesm2s", "umolesm2s",
+                  "ppfd"),
     "mmol/m2/s": ("mmolm2s", "mmolm2s1"),
+    "mol/m2/d": ("molm2d", "molm2d1", "molm2day", "molm2day1"),
+    "cal/cm2": ("calcm2", "ly", "langley", "langleys"),
+    "cal/cm2/min": ("calcm2min", "calcm2min1", "lymin", "lymin1", "langleymin"),
     "mol/m2": ("molm2", "mol"),
     "mmol/m2": ("mmolm2",),
 }  # fmt: skip
 KNOWN = {spelling: unit for unit, spellings in SPELLINGS.items() for spelling in spellings}
 OTHER_UNITS = {"nm", "um", "m", "mm", "cm", "s", "min", "h", "degc", "c", "%", "ts", "rn", "v",
                "mv", "volts", "deg", "utc", "hpa", "lux", "lx", "klx"}  # fmt: skip
+
+
+ILLUMINANCE = (
+    " Light as the eye sees it tells radiation under one kind of light alone: of daylight 1000 lx "
+    "are about 18.5 µmol m⁻² s⁻¹ of PAR (Thimijan and Heins 1983)."
+)
 
 
 def named(text: str) -> str | None:
@@ -108,7 +122,8 @@ def of_column(
             where,
             f"the unit '{in_file or found}'",
             f"one of {', '.join(known)}",
-            f"Declare it as `{key}`, or convert the values.",
+            f"Declare it as `{key}`, or convert the values."
+            + (ILLUMINANCE if _squeezed(in_file) in ("lux", "lx", "klx", "klux") else ""),
         )
     return found or "", []
 

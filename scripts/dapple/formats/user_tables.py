@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dapple.errors import InputError
-from dapple.formats import table_layouts, table_numbers
+from dapple.formats import column_names, json_layouts, table_layouts, table_numbers
 from dapple.formats.text_table import Table, build, cells_of, trimmed, uneven
 from dapple.formats.units import is_unit
 
 DELIMITERS = ";\t,|"
-LIGHT_FLAGS = (-999.0, -9999.0, -99999.0, -6999.0, -7999.0, -888.0, 7999.0, 6999.0, 9999.0,
-               99999.0)  # fmt: skip
+LIGHT_FLAGS = (-99.0, -99.9, -99.99, -888.0, -999.0, -999.9, -999.99, -6999.0, -7999.0, -8888.0,
+               -9999.0, -9999.9, -99999.0, -32768.0, 6999.0, 7999.0, 9999.0, 99999.0,
+               1e20, 1e30)  # fmt: skip
 """Numbers by which loggers and services mark missing light: none is a light."""
 
 
@@ -75,7 +76,8 @@ def read(path: str | Path, *, decimal: str = "") -> Table:
     """
     path = Path(path)
     lines = read_lines(path)
-    table = table_layouts.recognise(path, lines) or _plain(path, lines)
+    table = json_layouts.recognise(path, lines) or table_layouts.recognise(path, lines)
+    table = table or _with_spans(_plain(path, lines))
     return replace(table, decimal=decimal or table.decimal)
 
 
@@ -137,6 +139,14 @@ def _plain(path: Path, lines: Sequence[str]) -> Table:
         units = {name: unit for name, unit in zip(names, row, strict=False) if unit}
         first += 1
     return build(path, lines, header=header, delimiter=delimiter, first=first, units=units)
+
+
+def _with_spans(table: Table) -> Table:
+    """A table whose rows have a start and an end is stamped with the start."""
+    start, end = table.find(column_names.START), table.find(column_names.END)
+    if start is None or end is None or table.find(column_names.TIME) not in (None, start, end):
+        return table
+    return replace(table, known=table.known | {"time": start}, interval_label="start")
 
 
 def _is_value(cell: str) -> bool:

@@ -88,6 +88,8 @@ def read(
     records = records.drop_duplicates(COLUMNS)
     _check(records, where)
     if sensors is not None:
+        records, renamed = _as_in_table(records, sensors, where)
+        noticed += renamed
         check_sensors(records, sensors, where)
         if "calibration" in sensors:
             factor = sensors.set_index("sensor")["calibration"]
@@ -207,7 +209,8 @@ def _columns_of_sensors(
             )
     if found:
         return {label: names[0] for label, names in found.items()}
-    quantity = pattern or next((n for n in columns if _is_par(source, n)), "")
+    light = [pattern] if pattern else [name for name in columns if _is_par(source, name)]
+    quantity = light[0] if len(light) == 1 else ""
     named = [label for label in labels if _is_of(source.path.stem, label)]
     if quantity and (len(named) == 1 or len(labels) == 1):
         return {(named or labels)[0]: quantity}
@@ -288,6 +291,35 @@ def _with_intervals(records: pd.DataFrame) -> pd.DataFrame:
     result["par_umol_m2_s"] = records["par_umol_m2_s"]
     result[INTERVAL] = 60.0 * length_min
     return result.reset_index(drop=True)
+
+
+def _as_in_table(
+    records: pd.DataFrame, sensors: pd.DataFrame, where: str | Path
+) -> tuple[pd.DataFrame, list[Finding]]:
+    """Labels that differ from the table's by case or noughts alone, as it has them: 007 is 7."""
+    known = list(sensors["sensor"])
+    recorded = records["sensor"].unique()
+    same = {
+        name: [label for label in known if _bare(label) == _bare(name)]
+        for name in recorded
+        if name not in known
+    }
+    found = {
+        name: labels[0]
+        for name, labels in same.items()
+        if len(labels) == 1 and sum(_bare(other) == _bare(name) for other in recorded) == 1
+    }
+    if not found:
+        return records, []
+    told = ", ".join(f"{name} as {label}" for name, label in list(found.items())[:6])
+    renamed = records.assign(sensor=records["sensor"].replace(found))
+    return renamed, [findings.note(where, f"labels read as the sensor table has them: {told}")]
+
+
+def _bare(label: str) -> str:
+    """A label in small letters, a number in it without noughts: 007 and 7.0 are 7."""
+    whole = re.sub(r"^(\d+)\.0+$", r"\1", label.strip().lower())
+    return re.sub(r"(?<!\d)0+(?=\d)", "", whole)
 
 
 def check_sensors(
