@@ -4,7 +4,7 @@ import hashlib
 import zlib
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, Self, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -13,18 +13,20 @@ from dapple.errors import InputError
 from dapple.scene.facing import facing_of
 
 POSITION = ["x_m", "y_m", "z_m"]
-Traced = TypeVar("Traced", bound="OfSensors")
 
 
 class OfSensors(Protocol):
     """What was traced of some sensors."""
 
-    def of(self: Traced, sensors: np.ndarray) -> Traced:
+    def of(self, sensors: np.ndarray) -> Self:
         """Of those with these numbers, in their order."""
 
     @classmethod
-    def joined(cls: type[Traced], parts: Sequence[Traced]) -> Traced:
+    def joined(cls, parts: Sequence[Self]) -> Self:
         """Of the sensors of all parts, one part after the other."""
+
+
+Traced = TypeVar("Traced", bound=OfSensors)
 
 
 def identities(sensors: pd.DataFrame, files: Iterable[str | Path], *settings: Any) -> np.ndarray:
