@@ -15,7 +15,7 @@ from typing import Any
 from rocrate.model.contextentity import ContextEntity
 from rocrate.rocrate import ROCrate
 
-from dapple import VERSION
+from dapple.version import VERSION
 
 WORKFLOW_RUN_TERMS = "https://w3id.org/ro/terms/workflow-run/context"
 NAME = "ro-crate-metadata.json"

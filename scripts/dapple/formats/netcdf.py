@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from dapple import VERSION
 from dapple.errors import InputError
 from dapple.formats.atomic import atomic
 from dapple.times import utc
+from dapple.version import VERSION
 
 TIME_ENCODING = {"units": "milliseconds since 1970-01-01", "dtype": "int64"}
 TIME = {

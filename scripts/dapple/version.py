@@ -1,0 +1,3 @@
+"""The version of dapple."""
+
+VERSION = "0.1.0"
