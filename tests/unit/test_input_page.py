@@ -36,6 +36,9 @@ TABLES = {
     "2023,8,10,5,0,500,100\n2023,8,10,5,30,510,100\n",
     "PVGIS hourly, slope 0": "Latitude (decimal degrees):\t48\nSlope: 0 deg.\ntime,Gb(i),Gd(i)\n"
     "20230810:1000,400,100\n20230810:1100,410,100\n\nGb(i): beam\n",
+    "PVGIS hourly as JSON, slope 0": '{"inputs": {"mounting_system": {"fixed": {"slope": {"value": '
+    '0}}}}, "outputs": {"hourly": [{"time": "20230810:1000", "Gb(i)": 400.0, "Gd(i)": 100.0}, '
+    '{"time": "20230810:1100", "Gb(i)": 410.0, "Gd(i)": 100.0}]}}',
     "FLUXNET or ICOS": "TIMESTAMP_START,TIMESTAMP_END,SW_IN\n202308101100,202308101130,500\n"
     "202308101130,202308101200,-9999\n",
     "CAMS radiation service": "# Coding: utf-8\n# Observation period;GHI;DHI\n"
@@ -44,6 +47,8 @@ TABLES = {
     "500,100,2023-08-10T10:00:00Z,2023-08-10T09:30:00Z,PT30M\n",
     "Open-Meteo": "latitude,longitude,elevation,utc_offset_seconds,timezone\n48,8,1,0,GMT\n\n"
     "time,shortwave_radiation (W/m²)\n2023-08-10T10:00,500\n2023-08-10T11:00,510\n",
+    "Open-Meteo as JSON": '{"utc_offset_seconds": 7200, "hourly": {"time": ["2023-08-10T12:00", '
+    '"2023-08-10T13:00"], "shortwave_radiation": [500, 510]}}',
     "KNMI hourly": "# BRON: KNMI\n# Q : Globale straling (in J/cm2) per uurvak\n#\n"
     "# STN,YYYYMMDD,   HH,    T,    Q\n#\n  260,20230810,   10,  180,  180\n"
     "  260,20230810,   24,  190,     \n",
@@ -59,6 +64,8 @@ TABLES = {
     "08/10/2023,03:01,501.0,700.0,100.0\n",
     "CSV of a spreadsheet, day and clock apart": "Datum;Uhrzeit;Globalstrahlung [W/m²]\n"
     "10.08.2023;12:00;500,0\n10.08.2023;12:10;1.001,5\n",
+    "rows with the start and the end of an interval": "Beginn;Ende;Globalstrahlung [W/m²]\n"
+    "10.08.2023 12:00;10.08.2023 12:10;500,0\n10.08.2023 12:10;10.08.2023 12:20;1.001,5\n",
 }
 RECORDS = {
     "HOBO export": ("logger_3_7.csv", '"Plot Title: a"\n"#","Date Time, GMT+02:00","PAR, uE"\n'

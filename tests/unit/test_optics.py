@@ -214,3 +214,17 @@ def test_bark_is_the_mean_of_two_measured_branches():
     assert band_mean(*map(np.array, default_spectra.BARK.values()), BANDS) == pytest.approx(
         fine, abs=0.02
     )
+
+
+def test_the_default_meadow_is_what_prosail_computes_for_mown_grass():
+    import prosail
+
+    leaf = default_spectra.LEAF
+    albedo = prosail.run_prosail(
+        leaf["n"], leaf["chlorophyll_ug_cm2"], leaf["carotenoids_ug_cm2"], leaf["brown"],
+        leaf["water_cm"], leaf["dry_matter_g_cm2"], 1.0, 57.3, 0.01, 40.0, 0.0, 0.0,
+        ant=leaf["anthocyanin_ug_cm2"], prospect_version="D", typelidf=2, rsoil=1.0, psoil=0.5,
+        factor="BHR",
+    )  # fmt: skip
+    at = np.array(default_spectra.MEADOW["wavelength_nm"], int) - 400
+    np.testing.assert_allclose(default_spectra.MEADOW["reflectance"], albedo[at], atol=6e-4)

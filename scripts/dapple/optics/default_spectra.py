@@ -27,10 +27,15 @@ al. 2019). The bark colour that comes with the published apple tree is brighter:
 0.36, blue 0.33 (Frey et al. 2025)."""
 
 MEADOW = {
-    "wavelength_nm": (400.0, 500.0, 550.0, 600.0, 680.0, 700.0),
-    "reflectance": (0.03, 0.05, 0.10, 0.07, 0.05, 0.12),
+    "wavelength_nm": tuple(400.0 + 25.0 * k for k in range(13)),
+    "reflectance": (
+        *(0.032, 0.030, 0.029, 0.030, 0.035, 0.079, 0.093),
+        *(0.068, 0.055, 0.047, 0.040, 0.036, 0.089),
+    ),
 }
-"""Assumed, typical of green grass in summer: dark in blue and red, a green peak, the red edge."""
+"""Computed, not measured: mown grass as PROSAIL has it (Jacquemoud et al. 2009) with the leaves
+above, leaf area index 1, leaf angles of a sphere and the soils of prosail half wet; its albedo
+under an even sky. A test computes it again."""
 
 CONIFER_BARK = {
     "wavelength_nm": (400.0, 450.0, 560.0, 650.0, 730.0, 840.0, 900.0),
