@@ -200,7 +200,7 @@ def test_images_in_another_system_are_warped(tmp_path, crs):
     assert read.raster.top_m == pytest.approx(5_324_010, abs=1.0)
     assert "warped to EPSG:25832" in " ".join(map(str, read.findings))
     alone = user_rasters.read(path, CAMERA)
-    assert alone.raster.crs == ("EPSG:32632" if crs == "EPSG:4326" else crs)
+    assert alone.raster.crs == (crs if crs == "EPSG:25833" else "EPSG:32632")
 
 
 def test_pixels_that_are_not_square_are_made_so(tmp_path):
@@ -228,3 +228,49 @@ def test_files_without_a_system_or_that_are_no_rasters_are_refused(tmp_path):
         user_rasters.read(tmp_path / "b.tif", CAMERA)
     with pytest.raises(InputError, match="no file"):
         user_rasters.read(tmp_path / "c.tif", CAMERA)
+
+
+# --- what looks right and is not ------------------------------------------------------------------
+
+
+def test_pixels_as_bright_as_the_file_can_tell_in_all_bands_are_no_data(tmp_path):
+    values = (leaves() * 32_768).astype("uint16")
+    values[:, :40] = 65_535
+    read = user_rasters.read(tiff(tmp_path / "a.tif", values), CAMERA, scale=32_768)
+    np.testing.assert_allclose(medians(read), USUAL, rtol=0.05)
+    assert any("40.0% of pixels as bright" in str(found) for found in read.findings)
+
+
+def test_numbers_that_no_image_holds_are_no_data(tmp_path):
+    values = leaves().astype("float32")
+    values[:, :40] = 1e20
+    read = user_rasters.read(tiff(tmp_path / "a.tif", values), CAMERA)
+    np.testing.assert_allclose(medians(read), USUAL, rtol=0.05)
+
+
+def test_a_scale_that_makes_most_leaves_brighter_than_light_is_refused(tmp_path):
+    path = tiff(tmp_path / "a.tif", (leaves() * 32_768).astype("uint16"))
+    with pytest.raises(InputError, match=r"1\.48 at half of the pixels.*Check `scale`"):
+        user_rasters.read(path, CAMERA, scale=10_000)
+
+
+def test_a_scale_that_makes_leaves_dim_is_doubted(tmp_path):
+    path = tiff(tmp_path / "a.tif", (leaves() * 10_000).astype("uint16"))
+    read = user_rasters.read(path, CAMERA, scale=65_535)
+    assert any("Check `scale`" in str(found) for found in read.findings)
+    assert not user_rasters.read(path, CAMERA, scale=10_000).findings
+
+
+@pytest.mark.parametrize(
+    ("crs", "grid", "pixel_m"),
+    [
+        ("EPSG:2263", Affine(0.3, 0, 980_000, 0, -0.3, 200_000), 0.3 * 0.3048),
+        ("EPSG:3857", Affine(0.1, 0, 1_170_000, 0, -0.1, 6_100_000), 0.1 * 0.676),
+    ],
+    ids=["feet", "web"],
+)
+def test_systems_that_are_not_in_true_metres_are_brought_into_them(tmp_path, crs, grid, pixel_m):
+    path = tiff(tmp_path / "a.tif", leaves().astype("float32"), crs=crs, grid=grid)
+    read = user_rasters.read(path, CAMERA)
+    assert read.raster.crs.startswith("EPSG:326")
+    assert read.raster.pixel_m == pytest.approx(pixel_m, rel=0.02)

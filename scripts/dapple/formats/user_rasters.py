@@ -17,24 +17,14 @@ from rasterio.windows import Window
 from dapple import findings
 from dapple.errors import InputError
 from dapple.findings import Finding
-from dapple.formats import raster_bands
+from dapple.formats import raster_bands, raster_scale
 from dapple.formats.raster_bands import CameraBand
 from dapple.formats.rasters import Raster, same_crs
 
 KNOWN_NODATA = (-10_000.0, -9999.0, -32_767.0, -32_768.0, -99_999.0, -3.4028234663852886e38)
 """What programs write where an image has no data: no reflectance is so low."""
-SCALES = {
-    32_768.0: "MicaSense, Metashape",
-    65_535.0: "16 bits",
-    10_000.0: "Sentinel, DJI Terra",
-    255.0: "8 bits",
-    100.0: "percent",
-}
-LARGEST = 2.0
-"""Specular glints pass 1; what passes this by much is scaled."""
-LOWEST = -0.05
-DARKEST_BRIGHTEST = 0.05
-"""The brightest band of vegetation reflects more than this."""
+BEYOND_ANY = 1e10
+"""So large a number is a flag."""
 MOST_VALUES = 400_000_000
 
 
@@ -75,8 +65,8 @@ def read(
     camera : sequence of bands
         Name, centre and width of each band that is wanted.
     crs : str
-        Coordinate system into which the images are warped; empty: their own, or, where that is in
-        degrees, the UTM zone of the place.
+        Coordinate system into which the images are warped; empty: their own, or, where that is not
+        in true metres, the UTM zone of the place.
     bounds_m : four floats or None
         West, south, east, north beyond which nothing is read, in `crs` [m].
     scale : float
@@ -119,7 +109,8 @@ def read(
         raise InputError(
             path, f"no readable raster ({error})", "a GeoTIFF", "Copy or export the file again."
         ) from error
-    values, gone = _without_data(values, valid, empty)
+    kind = np.dtype(file.dtypes[chosen[0] - 1])
+    values, gone = _without_data(values, valid, empty, np.iinfo(kind).max if is_integer else None)
     if how == "by order, for they have no names":
         noticed.append(
             findings.warning(
@@ -134,8 +125,8 @@ def read(
     noticed += [
         findings.note(path, f"{share:.1%} of pixels {text}") for text, share in gone.items()
     ]
-    values, factor = _reflectance(path, values, scale, scales, offsets, is_integer)
-    _check(path, values, camera)
+    values, factor = raster_scale.reflectance(path, values, scale, scales, offsets, is_integer)
+    noticed += raster_scale.check(path, values, camera)
     names = tuple(band.name for band in camera)
     raster = Raster(
         values.astype(np.float32), transform.c, transform.f, float(transform.a), target, names
@@ -179,7 +170,10 @@ def _target(path: Path, file: rasterio.DatasetReader, crs: str) -> str:
     if crs:
         return crs
     own = pyproj.CRS(file.crs.to_wkt())
-    if own.is_projected:
+    # Feet are no metres, and the web's Mercator stretches them by the latitude.
+    by = own.coordinate_operation.method_name if own.coordinate_operation else ""
+    is_metric = own.axis_info and own.axis_info[0].unit_name == "metre"
+    if own.is_projected and is_metric and "Pseudo" not in by:
         return str(file.crs.to_string())
     west, south, east, north = rasterio.warp.transform_bounds(file.crs, "EPSG:4326", *file.bounds)
     zone = int((0.5 * (west + east) + 180.0) // 6.0) + 1
@@ -314,73 +308,19 @@ def _bound(path: Path, window: Window, n_bands: int) -> None:
 
 
 def _without_data(
-    values: np.ndarray, valid: np.ndarray, empty: Sequence[float]
+    values: np.ndarray, valid: np.ndarray, empty: Sequence[float], largest: int | None
 ) -> tuple[np.ndarray, dict[str, float]]:
     """Values with NaN where there are none, and shares of pixels by reason."""
     gone: dict[str, float] = {}
-    flagged = np.isin(values, list(empty)).any(axis=0) | ~np.isfinite(values).all(axis=0)
+    flagged = np.isin(values, list(empty)).any(axis=0) | ~(np.abs(values) < BEYOND_ANY).all(axis=0)
     black = valid & ~flagged & (values == 0).all(axis=0)
+    white = valid & ~flagged & (values == largest).all(axis=0)
     for text, missing in (
         ("outside the image's mask", ~valid & ~flagged),
         ("flagged as no data", flagged),
         ("black in all bands, taken as no data", black),
+        ("as bright in all bands as the file can tell, taken as no data", white),
     ):
         if missing.any():
             gone[text] = float(missing.mean())
-    return np.where(valid & ~flagged & ~black, values, np.nan), gone
-
-
-def _reflectance(
-    path: Path,
-    values: np.ndarray,
-    declared: float,
-    scales: np.ndarray,
-    offsets: np.ndarray,
-    is_integer: bool,
-) -> tuple[np.ndarray, float | str]:
-    """Values as reflectance: by the declared scale, the file's own, or as they are."""
-    if declared:
-        return values / declared, declared
-    if (scales != 1.0).any() or (offsets != 0.0).any():
-        return values * scales[:, None, None] + offsets[:, None, None], "the file's own"
-    high = float(np.nanpercentile(values, 99)) if np.isfinite(values).any() else 0.0
-    if is_integer or high > LARGEST:
-        known = ", ".join(
-            f"{scale:g} ({who})" for scale, who in SCALES.items() if scale >= high / 1.5
-        )
-        raise InputError(
-            path,
-            f"{'whole numbers' if is_integer else 'values'} up to {high:g} and no scale",
-            "reflectance from 0 to 1, or the value that means 1",
-            f"Set `scale` of the plot to what the program wrote for a reflectance of 1: {known}.",
-        )
-    return values, 1.0
-
-
-def _check(path: Path, values: np.ndarray, camera: Sequence[CameraBand]) -> None:
-    """Raise an InputError where values cannot be the reflectance of vegetation."""
-    tops = []
-    for band, layer in zip(camera, values, strict=True):
-        there = layer[np.isfinite(layer)]
-        if not there.size:
-            raise InputError(
-                path, f"no data in band {band.name}", "reflectance",
-                "Export the image again; check `nodata` of the plot.",
-            )  # fmt: skip
-        low, high = np.percentile(there, (1, 99))
-        tops.append(high)
-        if low < LOWEST or high > LARGEST:
-            raise InputError(
-                path,
-                f"reflectance of {low:.3g} to {high:.3g} (1 to 99 %) in band {band.name}",
-                f"{LOWEST:g} to {LARGEST:g}",
-                "Check `scale` and `nodata` of the plot.",
-            )
-    if max(tops) < DARKEST_BRIGHTEST:
-        raise InputError(
-            path,
-            f"reflectance of at most {max(tops):.3g} in every band",
-            f"more than {DARKEST_BRIGHTEST:g} in the brightest: leaves reflect a third of the near "
-            "infrared",
-            "Check `scale` of the plot: the images look divided by too much.",
-        )
+    return np.where(valid & ~flagged & ~black & ~white, values, np.nan), gone
