@@ -1,5 +1,6 @@
 """Point clouds as other programs write them: read whole, or refused in one message."""
 
+import gzip
 import resource
 import struct
 import time
@@ -374,6 +375,13 @@ def test_rays_that_met_nothing_are_no_points_but_shots(tmp_path):
     assert fired.return_xyz_m == pytest.approx(XYZ[met], abs=1e-5)
 
 
+def test_axes_of_a_ply_may_be_in_capitals(tmp_path):
+    head = "ply\nformat ascii 1.0\nelement vertex 1\n"
+    axes = "".join(f"property float {axis}\n" for axis in "XYZ")
+    (tmp_path / "a.ply").write_text(f"{head}{axes}end_header\n1 2 3\n")
+    assert clouds.read(tmp_path / "a.ply").xyz_m.tolist() == [[1, 2, 3]]
+
+
 def test_a_cloud_with_normals_and_colours_is_no_ray_cloud(tmp_path):
     unit = np.tile([0.0, 0.6, 0.8], (400, 1))
     path = ray_cloud(tmp_path / "a.ply", XYZ + unit, XYZ, np.zeros(400, bool))
@@ -427,6 +435,12 @@ def test_units_in_a_header_are_turned_into_metres_with_a_word(tmp_path, unit, me
     assert len(source.notes) == 3
 
 
+def test_coordinates_from_the_centre_of_the_earth_are_refused(tmp_path):
+    path = with_crs(tmp_path / "a.laz", "EPSG:4978", 1.0)
+    with pytest.raises(InputError, match=r"from the centre of the earth .*out_srs"):
+        selection.take(*clouds.read_with_source(path), path)
+
+
 @pytest.mark.parametrize(("row", "metres"), [("[m] [m] [m]", 1.0), ("mm mm mm", 1e-3)])
 def test_a_row_of_units_below_the_header_is_no_header(tmp_path, row, metres):
     rows = "\n".join(" ".join(map(str, point)) for point in XYZ)
@@ -438,6 +452,21 @@ def test_a_file_of_another_format_than_its_name_says_is_told_so(tmp_path):
     path = las(tmp_path / "a.las").rename(tmp_path / "a.txt")
     with pytest.raises(InputError, match=r"begins as LAS or LAZ does.*end in \.laz"):
         clouds.read(path)
+
+
+@pytest.mark.parametrize("name", ["a.xyz.gz", "a.xyz", "a.laz"])
+def test_a_packed_file_is_told_to_be_unpacked(tmp_path, name):
+    (tmp_path / name).write_bytes(gzip.compress(b"X Y Z\n1 2 3\n"))
+    with pytest.raises(InputError, match=r"a gzip archive.*Unpack it first"):
+        clouds.read(tmp_path / name)
+
+
+@pytest.mark.parametrize("suffix", [".pts", ".xyz"])
+def test_fewer_points_than_a_text_announces_are_told(tmp_path, suffix):
+    (tmp_path / f"a{suffix}").write_text("4\n1 2 3 7\n4 5 6 7\n7 8 9 7\n")
+    cloud, source = clouds.read_with_source(tmp_path / f"a{suffix}")
+    assert len(cloud) == 3
+    assert "announces 4 points and holds 3" in " ".join(source.notes)
 
 
 def test_several_scans_in_one_pts_file_are_told_apart(tmp_path):
@@ -469,6 +498,7 @@ def test_a_column_of_text_is_left_out_with_a_note(tmp_path):
         ("A B C\n1 2 3\n4 5 6\n", "the columns 'A B C'"),
         ("this is a letter\nabout a cloud\n", "no row of numbers"),
         ("X Y\n1 2\n3 4\n", "no row of numbers"),
+        ("X;Y;Z\n4,321,000.12;5,332,000.1;1.5\n", "no row of numbers: .*4,321,000.12"),
     ],
 )
 def test_a_text_that_is_no_table_of_points_is_refused(tmp_path, text, message):

@@ -81,7 +81,7 @@ def in_metres(cloud: Cloud, source: Source, path: str | Path) -> tuple[Cloud, So
     Raises
     ------
     InputError
-        They are in degrees: a degree of longitude is no fixed length.
+        They are in degrees: a degree of longitude is no fixed length; or geocentric: no axis is up.
     """
     units = source.units
     if units.degrees:
@@ -93,6 +93,15 @@ def in_metres(cloud: Cloud, source: Source, path: str | Path) -> tuple[Cloud, So
             "a projected coordinate system in metres",
             f"Reproject the cloud, for example with `pdal translate in.laz out.laz reprojection "
             f"--filters.reprojection.out_srs=EPSG:{_utm_zone(low[0], low[1])}`.",
+        )
+    if units.geocentric:
+        x, y, z = cloud.world_xyz_m.mean(axis=0)
+        raise InputError(
+            path,
+            f"coordinates from the centre of the earth ({x:.0f}, {y:.0f}, {z:.0f})",
+            "a projected coordinate system in metres, with heights",
+            "Reproject the cloud, for example with `pdal translate in.laz out.laz reprojection "
+            "--filters.reprojection.out_srs=EPSG:32632` or another UTM zone.",
         )
     factor = np.array([units.horizontal_m, units.horizontal_m, units.vertical_m])
     if (factor == 1.0).all():

@@ -123,7 +123,7 @@ def describe(records: Mapping[tuple[str, int], list[bytes]]) -> tuple[str, Units
         return "", Units(), (f"The coordinate system of the file cannot be read ({said}).",)
     keys = _geo_keys(records)
     found = Units() if crs is None else units(crs)
-    if crs is None or not found.degrees:
+    if crs is None or not (found.degrees or found.geocentric):
         across = LINEAR_UNITS.get(keys.get(LINEAR, 0), found.horizontal_m)
         own = crs is not None and crs.is_compound
         up = found.vertical_m if own else LINEAR_UNITS.get(keys.get(VERTICAL_LINEAR, 0), across)
@@ -136,6 +136,8 @@ def units(crs: pyproj.CRS) -> Units:
     flat = _flat(crs)
     if flat.is_geographic:
         return Units(degrees=True)
+    if flat.is_geocentric:
+        return Units(geocentric=True)
     across = flat.axis_info[0].unit_conversion_factor if flat.axis_info else 1.0
     heights = [a.unit_conversion_factor for a in crs.axis_info if a.direction == "up"]
     # A system without heights: they are in the same unit.

@@ -62,7 +62,7 @@ class ScanFacts:
 
 @dataclass(frozen=True)
 class Units:
-    """Units of coordinates: metres of one unit, or degrees.
+    """Units of coordinates: metres of one unit, degrees, or axes through the earth's centre.
 
     Attributes
     ----------
@@ -70,11 +70,14 @@ class Units:
         Metres of a unit of east and north, and of a unit of height.
     degrees : bool
         East and north are longitude and latitude.
+    geocentric : bool
+        z points to the pole, not up.
     """
 
     horizontal_m: float = 1.0
     vertical_m: float = 1.0
     degrees: bool = False
+    geocentric: bool = False
 
 
 @dataclass(frozen=True)

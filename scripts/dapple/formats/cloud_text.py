@@ -63,6 +63,11 @@ def read(path: Path) -> RawCloud:
         for name, f in zip(order, factor, strict=True)
         if f != 1.0
     ]
+    if layout.announced is not None and scan is None and len(xyz) < layout.announced:
+        notes.append(
+            f"The file announces {layout.announced:,} points and holds {len(xyz):,}: its copy or "
+            "export may have been cut off."
+        )
     units = Units(degrees=degrees)
     source = Source(len(xyz), units=units, notes=tuple(notes), scans=scans)
     return RawCloud(xyz, attributes=attributes, source=source)

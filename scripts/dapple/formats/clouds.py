@@ -109,9 +109,10 @@ def read_with_source(path: str | Path) -> tuple[Cloud, Source]:
         that are not finite or that have already lost their millimetres.
     """
     path = Path(path)
+    if path.is_file():
+        _is_what_it_is_called(path)
     reader = _by_suffix(path, READERS, "read")
     _exists(path)
-    _is_what_it_is_called(path)
     raw = reader(path)
     return _to_cloud(path, raw), raw.source
 

@@ -91,6 +91,7 @@ def read_header(path: Path, handle: BinaryIO) -> Header:
                 case ["property", "list", length, kind, name]:
                     elements[-1][2].append(Property(name, TYPES[kind], TYPES[length]))
                 case ["property", kind, name]:
+                    name = name.lower() if name in ("X", "Y", "Z") else name
                     elements[-1][2].append(Property(name, TYPES[kind]))
         except (KeyError, IndexError, ValueError) as error:
             raise damaged(path, f"the header line `{' '.join(words)[:80]}`") from error

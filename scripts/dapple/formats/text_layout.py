@@ -72,6 +72,8 @@ class Layout:
         Fields of the first row.
     header : tuple of str or None
         The names as the file has them.
+    announced : int or None
+        Number of points that a line before the first row tells.
     """
 
     skip: int
@@ -81,6 +83,7 @@ class Layout:
     encoding: str
     width: int
     header: tuple[str, ...] | None
+    announced: int | None = None
 
     def named(self, names: tuple[str, ...]) -> "Layout":
         """The same with other names of columns."""
@@ -104,9 +107,13 @@ def find(path: Path) -> Layout | None:
         if fields := _fields(line):
             separator, decimal, words = fields
             names, header = _names(path, lines[:number], separator, words)
-            return Layout(number, names, separator, decimal, encoding, len(words), header)
+            counts = [int(text) for text in map(str.strip, lines[:number]) if _is_count(text)]
+            announced = counts[-1] if counts else None
+            width = len(words)
+            return Layout(number, names, separator, decimal, encoding, width, header, announced)
     words = [word for line in lines[-3:] for word in line.split()]
-    if any(_has_axes(line) for line in lines) or not words:
+    titled = any(_has_axes(line) for line in lines)
+    if not words or (titled and not any(len(re.findall(r"\d", word)) > 1 for word in words)):
         return None
     raise no_table(path, "no row of numbers: '" + " ".join(words)[:80] + "'")
 
@@ -127,6 +134,11 @@ def axis(name: str) -> Axis | None:
     return None
 
 
+def _is_count(text: str) -> bool:
+    """A line that holds one whole number alone: the number of points that follow."""
+    return re.fullmatch(r"\d{1,18}", text) is not None
+
+
 def _encoding(path: Path) -> str:
     with path.open("rb") as handle:
         head = handle.read(1 << 16)
@@ -144,7 +156,7 @@ def _encoding(path: Path) -> str:
 def _fields(line: str) -> tuple[str, str, list[str]] | None:
     """Separator, decimal sign and fields of a row of three numbers or more; None of another."""
     text = line.strip()
-    if not text or re.fullmatch(r"\d+", text):  # the number of points that follow
+    if not text or _is_count(text):
         return None
     for separator in (";", "\t", r"\s+", ","):
         words = _split(text, separator)
@@ -171,7 +183,7 @@ def _names(
     units: tuple[str, ...] = ()
     for line in reversed(before):
         text = line.strip().lstrip(MARKS)
-        if not text or re.fullmatch(r"\d+", text):
+        if not text or _is_count(text):
             continue
         if _has_axes(text):
             names = _header_words(path, text, separator, width)
