@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 import pytest
 
-from dapple.cloud import branches
+from dapple.cloud import branches, eigenvalues
 from dapple.cloud.auto import chosen
 from dapple.cloud.classifiers import CLASSIFIERS
 from dapple.cloud.classify import classify, codes, majority
@@ -188,6 +188,24 @@ def test_on_a_coarse_cloud_the_stem_is_still_wood():
     stem = (np.hypot(*coarse.xyz_m[:, :2].T) < 0.1) & (coarse.xyz_m[:, 2] < 1.5)
     assert found[stem].mean() < 0.05
     assert scores(codes(found), coarse.attributes["Classification"])["kappa"] > 0.4
+
+
+def test_the_order_of_the_points_does_not_matter():
+    xyz_m, _ = tree()
+    order = np.random.default_rng(2).permutation(len(xyz_m))
+    assert np.mean(by_geometry(xyz_m[order]) == by_geometry(xyz_m)[order]) > 0.995
+
+
+def test_what_lies_between_sure_groups_goes_to_the_one_that_it_is_like():
+    rng = np.random.default_rng(4)
+    rows = np.concatenate([rng.normal(m, 0.5, (100, 3)) for m in (2.0, -2.0, 1.2, -1.2)])
+    group = np.repeat([0, 1, 2, 3], 100)
+    odds = eigenvalues.discriminate(rows, group == 0, group == 1)
+    assert (odds[group == 2] > 0).mean() > 0.95
+    assert (odds[group == 3] < 0).mean() > 0.95
+    assert np.abs(odds).max() == 3
+    few = eigenvalues.discriminate(rows, np.arange(400) < 20, group == 1)
+    assert not few.any()
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from dapple.cloud import branches, voxel_groups
+from dapple.cloud import branches, eigenvalues, voxel_groups
 from dapple.errors import EmptyCloudError
 from dapple.formats.clouds import Cloud
 
@@ -17,6 +17,12 @@ COARSER = 1, 2, 4
 """Nodes of so many times the size are looked at, too: on them paths around a thick stem are one."""
 SPACING_POINTS = 20_000
 """Of so many points the distance to their neighbours is measured."""
+MOST_NODES = 3_000_000
+"""Of larger clouds the nodes are coarser: paths through more do not fit into memory."""
+NEIGHBOURHOODS = 4 / 3, 7 / 3, 14 / 3
+"""Thirds of their width, in nodes."""
+DISTANCE_COUNTS = 4.0
+"""A node's width of distance from a branch is worth so many log odds of shape."""
 LEAF_AREA_PER_WOOD_AREA = 300.0, 5000.0
 """Bounds of what is taken from the cloud."""
 
@@ -46,6 +52,8 @@ def by_geometry(
     2. How thick it is follows from what it carries: the pipe model (Shinozaki et al. 1964) gives
        cross-section = carried leaf area / `leaf_area_per_wood_area`. Nodes within the diameter
        of a path are taken for wood.
+    3. Nodes that are surely of one kind by this teach a linear discriminant what wood looks like
+       in this cloud (`eigenvalues.discriminate`), which tips the balance for nodes in between.
 
     All lengths are taken from the cloud: its unit, its place and its height above the sea do not
     matter.
@@ -61,12 +69,13 @@ def by_geometry(
     foot_share : float
         Paths end at nodes up to this share of the cloud's height.
     thinnest_branch : float
-        Paths that would be a branch of less than this radius, in nodes, are none.
+        Paths that would be a branch of less than this radius, in nodes, are none; on the coarser
+        nodes of less than twice as much.
     leaf_area_per_wood_area : float or None
         Area of the cloud that a cross-section of wood carries [m² m⁻²]. None takes it from the
         stem, within 300 to 5000.
     slack : float
-        Distance to the branch that still is wood, in nodes.
+        Distance to the branch that is wood as likely as leaf, where shape does not tell, in nodes.
 
     Returns
     -------
@@ -95,16 +104,14 @@ def by_geometry(
     foot_m, top_m = np.quantile(xyz_m[:, 2], [0.0005, 0.9995])
     height_m = float(top_m - foot_m)
     size_m = max(node_spacings * _spacing_m(xyz_m), node_share * height_m)
+    groups, places_m, size_m = voxel_groups.nodes(xyz_m, size_m, MOST_NODES)
     slice_m = max(foot_share * height_m, 2 * size_m)
-    groups = voxel_groups.group(xyz_m, size_m)
-    places_m = groups.total(xyz_m) / groups.size[:, None]
     beyond_m = np.full(len(places_m), np.inf)
     for coarser in COARSER:
         node_m = coarser * size_m
         nodes_m = places_m
         if coarser > 1:
-            coarse = voxel_groups.group(xyz_m, node_m)
-            nodes_m = coarse.total(xyz_m) / coarse.size[:, None]
+            nodes_m = voxel_groups.nodes(xyz_m, node_m, MOST_NODES)[1]
         ratio = leaf_area_per_wood_area
         if ratio is None:
             stem_m2 = branches.stem_area_m2(nodes_m, node_m, foot_m, max(slice_m, 2 * node_m))
@@ -112,12 +119,16 @@ def by_geometry(
             ratio = float(np.clip(ratio, *LEAF_AREA_PER_WOOD_AREA))
         carried = branches.support(nodes_m, foot_m + slice_m)
         radius_m = np.sqrt(carried * node_m**2 / (np.pi * ratio))
-        thick = radius_m >= thinnest_branch * node_m
+        thick = radius_m >= thinnest_branch * min(coarser, 2) * node_m  # coarse paths wander
         found = branches.distance_beyond_wood(
             places_m, nodes_m[thick], radius_m[thick], reach_m=2 * size_m
         )
         beyond_m = np.minimum(beyond_m, found)
-    return (beyond_m > slack * size_m)[groups.voxel_of_point]
+    shapes = [eigenvalues.around(places_m, edge * size_m) for edge in NEIGHBOURHOODS]
+    features = np.concatenate([one.shape[one.voxel_of_point] for one in shapes], axis=1)
+    alike = eigenvalues.discriminate(features, beyond_m <= 0, beyond_m > size_m)
+    wood = DISTANCE_COUNTS * (slack - beyond_m / size_m) + alike > 0
+    return ~wood[groups.voxel_of_point]
 
 
 def _at_home(xyz_m: np.ndarray) -> np.ndarray:

@@ -179,7 +179,7 @@ def assign(xyz_m: np.ndarray, found: pd.DataFrame, surface: GroundSurface) -> np
     voxels, an edge costs its length squared, so that paths keep to what was scanned densely, and a
     node belongs to the stem whose root is the nearest one along the paths.
     """
-    groups, nodes = _nodes(xyz_m)
+    groups, nodes, _ = voxel_groups.nodes(xyz_m, NODE_M, MOST_NODES)
     k = min(NEIGHBOURS, len(nodes) - 1)
     if k < 1:
         return np.full(len(xyz_m), int(found["id"].iloc[0]))
@@ -199,16 +199,6 @@ def assign(xyz_m: np.ndarray, found: pd.DataFrame, surface: GroundSurface) -> np
     by_root[roots] = owner
     stem = np.where(np.isfinite(cost), by_root[np.where(source >= 0, source, 0)], 0)
     return stem[groups.voxel_of_point]
-
-
-def _nodes(xyz_m: np.ndarray) -> tuple[voxel_groups.Groups, np.ndarray]:
-    """Voxels, larger where the plot is, and their centres of gravity."""
-    size = NODE_M
-    while True:
-        groups = voxel_groups.group(xyz_m, size)
-        if len(groups.start) <= MOST_NODES:
-            return groups, groups.total(xyz_m) / groups.size[:, None]
-        size *= 1.4
 
 
 def _roots(
