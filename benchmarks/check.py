@@ -12,6 +12,7 @@ import resource
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -48,6 +49,14 @@ def write(path: Path, n: int) -> None:
     clouds.write(path, cloud, scale_m=1e-3)
 
 
+def settings_of(path: Path) -> dict[str, Any]:
+    """The configuration of a run on a cloud and no more."""
+    return validate(
+        {"source": "cloud", "cloud": {"path": str(path)}, "reconstructions": ["polygons"],
+         "measured": {"kind": "none"}}
+    ).model_dump()  # fmt: skip
+
+
 def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     arguments.add_argument("--points", type=int, default=5_000_000)
@@ -57,10 +66,7 @@ def main() -> None:
         maker = multiprocessing.get_context("spawn").Process(target=write, args=(path, n))
         maker.start()  # of its own, so that its memory is not counted
         maker.join()
-        settings = validate(
-            {"source": "cloud", "cloud": {"path": str(path)}, "reconstructions": ["polygons"],
-             "measured": {"kind": "none"}}
-        ).model_dump()  # fmt: skip
+        settings = settings_of(path)
         wall, used = time.perf_counter(), time.process_time()
         check = inspection.inspect(settings, cloud=path)
         wall, used = time.perf_counter() - wall, time.process_time() - used

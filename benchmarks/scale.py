@@ -1,34 +1,43 @@
-"""Memory and time of a large scan: points to polygons, shots to voxels.
+"""Memory and time of a large scan: check, points to polygons, shots to voxels.
 
     PYTHONPATH=scripts .venv/bin/python benchmarks/scale.py [--points N ...] [--shots N ...]
         [--output FOLDER]
 
 A plot of `check.py` with reflectance, of each size that is asked for; shots into a crown, half of
-them misses, chunk by chunk as from a file. Every stage runs in a process of its own, on files as
-its rule does, so that its peak memory is its own. The last rows are what a straight line through
-the sizes tells for 50 million points and 100 million shots. The table goes to `FOLDER`.
+them misses, chunk by chunk as from a file, their returns told apart by a classified cloud of half
+as many points. Every stage runs in a process of its own, on files as its rule does: its memory is
+the largest sum over that process and the programs that it runs. With more than one size the last
+rows are what a straight line through them tells for 50 million points and 100 million shots. The
+table goes to `FOLDER`; rows of sizes that it has already are replaced.
 """
 
 import argparse
 import multiprocessing
 import resource
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import psutil
 
 import check
 from dapple import steps
+from dapple.check import inspection
+from dapple.cloud import selection
 from dapple.cloud.classify import classify
 from dapple.cloud.clean import clean
 from dapple.config.settings import Settings
-from dapple.formats import clouds, meshes, shots
+from dapple.formats import clouds, json, meshes, shots
+from dapple.formats.clouds import LEAF, WOOD, Cloud
 from dapple.formats.shots import Shots
+from dapple.structure import polygon_sizes, summary
 
-FULL = {"clean": 50e6, "classify": 50e6, "polygons": 50e6, "voxels": 100e6}
+FULL = {"voxels": 100_000_000}
+FULL_POINTS = 50_000_000
 CHUNK = 500_000
 SETTINGS = Settings()
 
@@ -37,21 +46,51 @@ def make(folder: Path, n: int) -> None:
     check.write(folder / "points.laz", n)
 
 
+def checked(folder: Path, n: int) -> None:
+    inspection.inspect(check.settings_of(folder / "points.laz"), cloud=folder / "points.laz")
+
+
+def ingested(folder: Path, n: int) -> None:
+    path = folder / "points.laz"
+    cloud, _ = selection.take(*clouds.read_with_source(path), path)
+    clouds.write(folder / "ingested.laz", cloud)
+
+
 def cleaned(folder: Path, n: int) -> None:
     settings = SETTINGS.clean.model_dump(exclude={"distance_points"})
-    cloud, _ = clean(clouds.read(folder / "points.laz"), **settings)
+    cloud, counts = clean(clouds.read(folder / "ingested.laz"), **settings)
     clouds.write(folder / "clean.laz", cloud)
+    json.write(folder / "clean.json", counts)
 
 
-def classified(folder: Path, n: int) -> None:
-    cloud, _ = classify(clouds.read(folder / "clean.laz"), **dict(SETTINGS.classify), seed=1)
+def classified(folder: Path, n: int, method: str = "auto") -> None:
+    settings = dict(SETTINGS.classify) | {"method": method}
+    cloud, _ = classify(clouds.read(folder / "clean.laz"), **settings, seed=1)
     clouds.write(folder / "classes.laz", cloud)
 
 
 def polygons(folder: Path, n: int) -> None:
-    settings = SETTINGS.polygons.model_dump(exclude={"bracket"})
-    made = steps.polygons(clouds.read(folder / "classes.laz"), seed=1, **settings)
-    meshes.write_ply(folder / "leaf.ply", made["leaf"], np.zeros(3))
+    settings = SETTINGS.polygons.model_dump()
+    cloud = clouds.read(folder / "classes.laz")
+    made = steps.polygons(cloud, seed=1, **settings)
+    for kind, mesh in made.items():
+        meshes.write_ply(folder / f"{kind}.ply", mesh, cloud.origin_m)
+    facts = summary.of_meshes(made["leaf"], made["wood"])
+    del made
+    leaf_m = cloud.xyz_m[cloud.attributes["Classification"] == LEAF]
+    used = polygon_sizes.resolved(leaf_m, settings)
+    polygon_sizes.resolved(leaf_m, settings | {"voxel_size_m": polygon_sizes.AUTO})
+    polygon_sizes.bracket(leaf_m, seed=1, **used)
+    json.write(folder / "summary.json", facts)
+
+
+def crown(folder: Path, n: int) -> None:
+    """A classified cloud of points at random where the returns of `fired` are, and shots."""
+    rng = np.random.default_rng(1)
+    xyz_m = rng.uniform([-2, -2, 1], [2, 2, 5], (n // 2, 3))
+    kinds = np.where(rng.random(n // 2) < 0.7, LEAF, WOOD).astype(np.uint8)
+    clouds.write(folder / "classes.laz", Cloud(xyz_m, attributes={"Classification": kinds}))
+    shots.write_chunks(folder / "shots.parquet", fired(n))
 
 
 def fired(n: int) -> Iterator[Shots]:
@@ -73,16 +112,11 @@ def fired(n: int) -> Iterator[Shots]:
         )
 
 
-def write_shots(folder: Path, n: int) -> None:
-    shots.write_chunks(folder / "shots.parquet", fired(n))
-
-
 def voxels(folder: Path, n: int) -> None:
-    from dapple.structure.voxel_sums import Grid
-    from dapple.structure.voxels import plant_area_density
-
-    grid = Grid.around(np.array([[-2.0, -2.0, 1.0], [2.0, 2.0, 5.0]]), 0.2)
-    plant_area_density(shots.iterate(folder / "shots.parquet"), grid)
+    cloud = clouds.read(folder / "classes.laz")
+    kinds = steps.return_kinds(cloud, SETTINGS.classify.majority_voxel_m)
+    settings = SETTINGS.voxels.model_dump(exclude={"sizes_m"})
+    steps.voxels(shots.iterate(folder / "shots.parquet"), cloud, 0.2, kinds=kinds, **settings)
 
 
 def measured(stage: Callable[[Path, int], None], folder: Path, n: int) -> dict[str, float]:
@@ -104,9 +138,33 @@ def measured(stage: Callable[[Path, int], None], folder: Path, n: int) -> dict[s
     process = multiprocessing.get_context("fork").Process(target=run)
     process.start()
     sender.close()
+    sums = [0.0]
+    watch = threading.Thread(target=_watched, args=(process.pid, sums))
+    watch.start()
     found: dict[str, float] = receiver.recv()
     process.join()
-    return found
+    watch.join()
+    return found | {"peak_gb": max(found["peak_gb"], max(sums) / 1e9)}
+
+
+def _watched(pid: int, sums: list[float]) -> None:
+    """Add up the memory of a process and of what it started, ten times a second [bytes]."""
+    try:
+        process = psutil.Process(pid)
+        while process.is_running() and process.status() != psutil.STATUS_ZOMBIE:
+            sums.append(sum(one.memory_info().rss for one in (process, *process.children(True))))
+            time.sleep(0.1)
+    except psutil.NoSuchProcess:
+        return
+
+
+STAGES = {
+    "check": checked,
+    "ingest": ingested,
+    "clean": cleaned,
+    "classify": classified,
+    "polygons": polygons,
+}
 
 
 def main() -> None:
@@ -118,29 +176,40 @@ def main() -> None:
         "--shots", type=int, nargs="*", default=[2_500_000, 5_000_000, 10_000_000]
     )
     arguments.add_argument("--output", type=Path)
+    arguments.add_argument("--folder", type=Path, help="for files on the way; they are removed")
     options = arguments.parse_args()
     rows = []
     for made, stages, sizes in (
-        (make, {"clean": cleaned, "classify": classified, "polygons": polygons}, options.points),
-        (write_shots, {"voxels": voxels}, options.shots),
+        (make, STAGES, options.points),
+        (crown, {"voxels": voxels}, options.shots),
     ):
         for n in sizes:
-            with tempfile.TemporaryDirectory() as folder:
+            with tempfile.TemporaryDirectory(dir=options.folder) as folder:
                 measured(made, Path(folder), n)
                 for name, stage in stages.items():
                     rows.append({"stage": name, "size": n} | measured(stage, Path(folder), n))
                     print(rows[-1], flush=True)
+                    _keep(rows, options.output)
+
+
+def _keep(rows: list[dict], folder: Path | None) -> None:
+    """Put the rows and their fits into the one that there is."""
     table = pd.DataFrame(rows).assign(by="measured")
+    path = folder / "scale.csv" if folder else None
+    if path and path.exists():
+        table = pd.concat([pd.read_csv(path).query("by == 'measured'"), table])
+        table = table.drop_duplicates(["stage", "size"], keep="last")
+    table = table.sort_values("size", kind="stable", ignore_index=True)
     for name, group in table.groupby("stage", sort=False):
-        if len(group) > 1:
+        full = FULL.get(str(name), FULL_POINTS)
+        if len(group) > 1 and full not in set(group["size"]):
             fitted = {
-                column: np.polyval(np.polyfit(group["size"], group[column], 1), FULL[name])
+                column: np.polyval(np.polyfit(group["size"], group[column], 1), full)
                 for column in ("cpu_s", "peak_gb")
             }
-            table.loc[len(table)] = {"stage": name, "size": FULL[name], "by": "fit"} | fitted
-    print(table.to_string(index=False))
-    if options.output:
-        table.to_csv(options.output / "scale.csv", index=False, float_format="%.3g")
+            table.loc[len(table)] = {"stage": name, "size": full, "by": "fit"} | fitted
+    if path:
+        table.to_csv(path, index=False, float_format="%.3g")
 
 
 if __name__ == "__main__":

@@ -66,14 +66,13 @@ def polygons(cloud: Cloud, *, seed: int, **settings: Any) -> dict[str, Mesh]:
         No point is leaf.
     """
     kinds = cloud.attributes["Classification"]
-    leaf_m, wood_m = (cloud.xyz_m[kinds == kind] for kind in (LEAF, WOOD))
+    leaf_m = cloud.xyz_m[kinds == LEAF]
     settings = polygon_sizes.resolved(leaf_m, settings)
-    return {
-        "leaf": reconstruct(leaf_m, what="leaf", seed=seed, **settings),
-        "wood": reconstruct(wood_m, what="wood", seed=seed, **settings)
-        if len(wood_m)
-        else mesh_files.empty(),
-    }
+    leaf = reconstruct(leaf_m, what="leaf", seed=seed, **settings)
+    del leaf_m  # of a large cloud, wood has no room beside it
+    wood_m = cloud.xyz_m[kinds == WOOD]
+    wood = reconstruct(wood_m, what="wood", seed=seed, **settings) if len(wood_m) else None
+    return {"leaf": leaf, "wood": wood or mesh_files.empty()}
 
 
 def surfels(

@@ -94,6 +94,10 @@ def majority(xyz_m: np.ndarray, is_leaf: np.ndarray, voxel_size_m: float = 0.05)
     """
     if len(xyz_m) == 0:
         return np.zeros(0, bool)
-    groups = voxel_groups.group(xyz_m, voxel_size_m)
-    leaf_wins = 2 * groups.total(np.asarray(is_leaf)) >= groups.size
-    return leaf_wins[groups.voxel_of_point]
+    is_leaf = np.asarray(is_leaf)
+    wins = np.empty(len(xyz_m), bool)
+    for slab in voxel_groups.slabs(voxel_groups.cells(xyz_m[:, 0], voxel_size_m)):
+        groups = voxel_groups.group(xyz_m[slab], voxel_size_m)
+        leaf_wins = 2 * groups.total(is_leaf[slab]) >= groups.size
+        wins[slab] = leaf_wins[groups.voxel_of_point]
+    return wins

@@ -12,6 +12,7 @@ from dapple.cloud import outliers, voxel_groups
 from dapple.cloud.ground_finder import GROUND_CLASS
 from dapple.errors import EmptyCloudError
 from dapple.formats import ground_surface
+from dapple.formats.cloud_raw import joined
 from dapple.formats.clouds import Cloud
 from dapple.formats.ground_surface import GroundSurface
 
@@ -105,23 +106,24 @@ def clean(
     ):
         kept &= chosen
         counts[f"after_{step}"] = _not_empty(int(kept.sum()), step, counts, where)
-    cloud = cloud.select(kept)
+    rows = np.flatnonzero(kept)
     chosen, versions = outliers.inliers(
-        cloud.xyz_m,
+        cloud.xyz_m[rows] if len(rows) < len(cloud) else cloud.xyz_m,
         outlier_backend,
         neighbours=outlier_neighbours,
         multiplier=outlier_multiplier,
         pdal=pdal,
         cloudcompare=cloudcompare,
     )
-    cloud = cloud.select(chosen)
-    counts["after_outliers"] = _not_empty(len(cloud), "outliers", counts, where)
+    rows = rows[chosen]
+    counts["after_outliers"] = _not_empty(len(rows), "outliers", counts, where)
     if outlier_backend == "none":
         skipped.append("outliers: outlier_backend is none")
     if thin_voxel_m is None:
         skipped.append("thinning: thin_voxel_m is not set")
+        cloud = cloud.select(rows)
     else:
-        cloud = thin(cloud, thin_voxel_m)
+        cloud = thin(cloud, thin_voxel_m, rows)
     counts["after_thinning"] = len(cloud)
     facts = {"skipped": skipped, "outlier_backend": outlier_backend, "versions": versions}
     return cloud, counts | facts
@@ -152,7 +154,7 @@ def _within(
     return compare(cloud.attributes[attribute].astype(np.float64), limit)
 
 
-def thin(cloud: Cloud, voxel_size_m: float) -> Cloud:
+def thin(cloud: Cloud, voxel_size_m: float, rows: np.ndarray | None = None) -> Cloud:
     """Replace the points of each voxel by one at their centre of gravity.
 
     PDAL's voxel filters keep a point that exists (the first, the nearest to the centre or to
@@ -164,6 +166,8 @@ def thin(cloud: Cloud, voxel_size_m: float) -> Cloud:
         At least one point.
     voxel_size_m : float
         Edge of the voxels [m], aligned to multiples of it from the local origin.
+    rows : (k,) int64 or None
+        Points that count, ascending; None: all.
 
     Returns
     -------
@@ -172,6 +176,17 @@ def thin(cloud: Cloud, voxel_size_m: float) -> Cloud:
         of `Reflectance` the mean of the decibels, not of the power; NaN does not count, whole
         numbers are rounded. `CATEGORIES` take the most frequent value, the smallest of equals.
     """
+    columns = voxel_groups.cells(cloud.xyz_m[:, 0], voxel_size_m)
+    columns = columns if rows is None else columns[rows]
+    pieces = []
+    for slab in voxel_groups.slabs(columns):
+        piece = _thinned(cloud.select(slab if rows is None else rows[slab]), voxel_size_m)
+        pieces.append({"xyz_m": piece.xyz_m, **piece.attributes})
+    attributes = joined(pieces)
+    return Cloud(attributes.pop("xyz_m"), cloud.origin_m, attributes)
+
+
+def _thinned(cloud: Cloud, voxel_size_m: float) -> Cloud:
     groups = voxel_groups.group(cloud.xyz_m, voxel_size_m)
     attributes = {
         name: (_most_frequent if name in CATEGORIES else _mean)(values, groups)

@@ -71,7 +71,7 @@ class CommandLine:
         """See `Engine`."""
         with tempfile.TemporaryDirectory(prefix="cloudcompare-") as folder:
             given, kept = Path(folder, "given.ply"), Path(folder, "kept.ply")
-            write_points(given, xyz_m - _middle(xyz_m))
+            write_points(given, xyz_m, _middle(xyz_m))
             # CloudCompare counts the point itself among its neighbours, hence the + 1.
             limit_s = programs.limit_s(len(xyz_m))
             self._run(
@@ -85,7 +85,7 @@ class CommandLine:
             given, surface = Path(folder, "given.ply"), Path(folder, "mesh.ply")
             result = Path(folder, "result.ply")
             points_m, vertices_m = _tilted(xyz_m, mesh.vertices_m)
-            write_points(given, points_m)
+            write_points(given, points_m, np.zeros(3))
             write_mesh(surface, vertices_m, mesh.faces)
             limit_s = programs.limit_s(len(xyz_m))
             self._run([given, surface], ["-C2M_DIST"], result, limit_s)
@@ -133,7 +133,7 @@ class CloudComPy:
     def inliers(self, xyz_m: np.ndarray, neighbours: int, multiplier: float) -> np.ndarray:
         """See `Engine`."""
         with tempfile.TemporaryDirectory(prefix="cloudcompy-") as folder:
-            cloud = self._load(Path(folder, "given.ply"), xyz_m - _middle(xyz_m))
+            cloud = self._load(Path(folder, "given.ply"), xyz_m, _middle(xyz_m))
         kept = self._module.CloudSamplingTools.sorFilter(
             cloud=cloud, knn=neighbours + 1, nSigma=float(multiplier)
         )
@@ -148,7 +148,7 @@ class CloudComPy:
         module = self._module
         points_m, vertices_m = _tilted(xyz_m, mesh.vertices_m)
         with tempfile.TemporaryDirectory(prefix="cloudcompy-") as folder:
-            cloud = self._load(Path(folder, "given.ply"), points_m)
+            cloud = self._load(Path(folder, "given.ply"), points_m, np.zeros(3))
             surface = Path(folder, "mesh.ply")
             write_mesh(surface, vertices_m, mesh.faces)
             loaded = module.loadMesh(str(surface))
@@ -160,8 +160,8 @@ class CloudComPy:
         last = cloud.getNumberOfScalarFields() - 1
         return np.abs(cloud.getScalarField(last).toNpArrayCopy()).astype(np.float64)
 
-    def _load(self, path: Path, xyz_m: np.ndarray):
-        write_points(path, xyz_m)
+    def _load(self, path: Path, xyz_m: np.ndarray, middle_m: np.ndarray):
+        write_points(path, xyz_m, middle_m)
         return self._module.loadPointCloud(str(path))
 
 
@@ -219,17 +219,19 @@ def summary(distance_m: np.ndarray, *, close_m: float = 0.02) -> dict:
     }
 
 
-def write_points(path: Path, xyz_m: np.ndarray) -> None:
-    """Write points and their row numbers as binary PLY, single precision."""
-    row = np.arange(len(xyz_m))
-    columns = dict(zip("xyz", np.asarray(xyz_m).T, strict=True))
-    columns |= {"scalar_RowHigh": row // INDEX_BASE, "scalar_RowLow": row % INDEX_BASE}
-    points = np.empty(len(xyz_m), [(name, "<f4") for name in columns])
-    for name, values in columns.items():
-        points[name] = values
+def write_points(path: Path, xyz_m: np.ndarray, middle_m: np.ndarray) -> None:
+    """Write points about a middle and their row numbers as binary PLY, single precision."""
+    names = (*"xyz", "scalar_RowHigh", "scalar_RowLow")
     with path.open("wb") as file:
-        file.write(_header(("vertex", len(points), [f"float {name}" for name in columns])))
-        points.tofile(file)
+        file.write(_header(("vertex", len(xyz_m), [f"float {name}" for name in names])))
+        for at in range(0, len(xyz_m), INDEX_BASE):
+            piece = xyz_m[at : at + INDEX_BASE] - middle_m
+            points = np.empty(len(piece), [(name, "<f4") for name in names])
+            for axis, name in enumerate("xyz"):
+                points[name] = piece[:, axis]
+            points["scalar_RowHigh"] = at // INDEX_BASE
+            points["scalar_RowLow"] = np.arange(len(piece))
+            points.tofile(file)
 
 
 def write_mesh(path: Path, vertices_m: np.ndarray, faces: np.ndarray) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from dapple import pdal as pdal_program
 from dapple import programs
 from dapple.cloud import cloudcompare as cc
-from dapple.cloud.selection import duplicates
+from dapple.cloud.selection import first_at_place
 from dapple.errors import InputError
 
 BACKENDS = ("cloudcompare", "pdal", "none")
@@ -86,14 +86,12 @@ def inliers(
 
 def _places(xyz_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The place of every point, and the places themselves in the order of their first points."""
-    again = duplicates(xyz_m)
-    if not again.any():
-        return np.arange(len(xyz_m)), xyz_m
-    _, first, place = np.unique(xyz_m, axis=0, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    rank = np.empty(len(first), np.int64)
-    rank[order] = np.arange(len(first))
-    return rank[place.ravel()], xyz_m[first[order]]
+    first = first_at_place(xyz_m)
+    once = first == np.arange(len(xyz_m))
+    if once.all():
+        return first, xyz_m
+    rank = np.cumsum(once) - 1
+    return rank[first], xyz_m[once]
 
 
 def _by_pdal(xyz_m: np.ndarray, neighbours: int, multiplier: float, program: str) -> np.ndarray:

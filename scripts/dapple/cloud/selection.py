@@ -181,16 +181,30 @@ def storable(attributes: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], 
 
 def duplicates(xyz_m: np.ndarray) -> np.ndarray:
     """(n,) True for points at exactly the place of one before them."""
+    return first_at_place(xyz_m) != np.arange(len(xyz_m))
+
+
+def first_at_place(xyz_m: np.ndarray) -> np.ndarray:
+    """(n,) int64, the first point at exactly the place of each point: itself, or one before it."""
+    first = np.arange(len(xyz_m))
     # Points at one place have one key; the few with a key of another are compared in full.
-    parts = np.ascontiguousarray(xyz_m + 0.0).view(np.uint64)  # + 0.0: no -0.0
-    key = parts[:, 0] * _ODD[0] ^ parts[:, 1] * _ODD[1] ^ parts[:, 2] * _ODD[2]
+    key = np.zeros(len(xyz_m), np.uint64)
+    for axis, odd in enumerate(_ODD):
+        key ^= (xyz_m[:, axis] + 0.0).view(np.uint64) * odd  # + 0.0: no -0.0
     ordered = np.sort(key)
-    shared = np.isin(key, np.unique(ordered[1:][ordered[1:] == ordered[:-1]]))
-    candidates = np.flatnonzero(shared)
+    repeated = ordered[1:][ordered[1:] == ordered[:-1]]
+    del ordered
+    if not len(repeated):
+        return first
+    candidates = np.flatnonzero(
+        repeated[np.searchsorted(repeated, key).clip(max=len(repeated) - 1)] == key
+    )
     order = candidates[np.lexsort(xyz_m[candidates].T)]
-    again = np.zeros(len(xyz_m), bool)
-    again[order[1:]] = (xyz_m[order[1:]] == xyz_m[order[:-1]]).all(axis=1)
-    return again
+    new = np.ones(len(order), bool)
+    new[1:] = (xyz_m[order[1:]] != xyz_m[order[:-1]]).any(axis=1)
+    begin = np.flatnonzero(new)
+    first[order] = np.repeat(order[begin], np.diff(begin, append=len(order)))
+    return first
 
 
 def _utm_zone(longitude: float, latitude: float) -> int:

@@ -47,7 +47,12 @@ MOST_BYTES = 1 << 26
 def read(path: Path) -> RawCloud:
     """Read a whole LAS or LAZ file, chunk by chunk."""
     header = cloud_las_header.read(path)
-    pieces = [{"xyz": raw.xyz_m, **raw.attributes} for raw in _chunks(path, header, CHUNK)]
+    named = _declared(header)
+    pieces = [
+        {"xyz": raw.xyz_m}
+        | {n: v for n, v in raw.attributes.items() if not named or n in named or n not in FIELDS}
+        for raw in _chunks(path, header, CHUNK)
+    ]
     n = sum(len(piece["xyz"]) for piece in pieces)
     crs, units, notes = cloud_crs.describe(header.records)
     step = float(header.scale[:2].max())
@@ -56,12 +61,11 @@ def read(path: Path) -> RawCloud:
         return RawCloud(np.empty((0, 3)), source=source)
     attributes = joined(pieces)
     xyz = attributes.pop("xyz")
-    named = _declared(header)
     # A field that is 0 everywhere was never filled, unless the file says that it was.
     kept = {
         name: values
         for name, values in attributes.items()
-        if name in named or name not in FIELDS or (named == set() and values.any())
+        if named or name not in FIELDS or values.any()
     }
     return RawCloud(xyz, _origin(header), kept, True, source)
 
@@ -86,30 +90,49 @@ def write(path: Path, raw: RawCloud, scale_m: float = 1e-4, crs: str | None = No
         header.add_crs(pyproj.CRS(crs))
     extra = {name: _storable(v) for name, v in raw.attributes.items() if name not in WRITABLE}
     header.add_extra_dims([laspy.ExtraBytesParams(n, v.dtype) for n, v in extra.items()])
+    for described in header.vlrs.get("ExtraBytesVlr"):
+        for one in described.extra_bytes_structs:  # laspy takes a single point's value for both
+            one.options &= ~(one.MIN_BIT_MASK | one.MAX_BIT_MASK)
     names = ",".join(name for name in raw.attributes if name in WRITABLE)
     header.vlrs.append(laspy.VLR(VLR_USER, VLR_ID, "fields in use", f"{names},".encode()))
-    counts = np.rint(raw.xyz_m / scale_m)
-    if counts.size and np.abs(counts).max() > np.iinfo(np.int32).max:
+    farthest_m = max(-raw.xyz_m.min(initial=0.0), raw.xyz_m.max(initial=0.0))
+    if np.rint(farthest_m / scale_m) > np.iinfo(np.int32).max:
         raise InputError(
             path,
-            f"a point {np.abs(raw.xyz_m).max():.0f} m from the local origin",
+            f"a point {farthest_m:.0f} m from the local origin",
             f"at most {np.iinfo(np.int32).max * scale_m:.0f} m at a step of {scale_m} m",
             "Use a coarser step, or an origin nearer to the points.",
         )
-    record = laspy.ScaleAwarePointRecord.zeros(len(raw.xyz_m), header=header)
-    for axis, name in enumerate("XYZ"):
-        record[name] = counts[:, axis].astype(np.int32)
-    for name in ("return_number", "number_of_returns"):
-        record[name] = np.ones(len(raw.xyz_m), np.uint8)
-    for name, values in raw.attributes.items():
-        if name == "ScanAngle":
-            record["scan_angle"] = np.rint(values / SCAN_ANGLE_STEP_DEG).astype(np.int16)
-            continue
-        record[STANDARD[name] if name in WRITABLE else name] = (
-            extra[name] if name in extra else _whole(path, name, values)
-        )
+    kept = {
+        name: extra[name] if name in extra else _stored(path, name, values)
+        for name, values in raw.attributes.items()
+    }
     with atomic(path) as partial, laspy.open(partial, "w", header=header) as writer:
-        writer.write_points(record)
+        for at in range(0, len(raw.xyz_m), CHUNK):
+            rows = slice(at, at + CHUNK)
+            writer.write_points(
+                _record(header, raw.xyz_m[rows], {n: values[rows] for n, values in kept.items()})
+            )
+
+
+def _record(
+    header: laspy.LasHeader, xyz_m: np.ndarray, attributes: dict[str, np.ndarray]
+) -> laspy.ScaleAwarePointRecord:
+    record = laspy.ScaleAwarePointRecord.zeros(len(xyz_m), header=header)
+    for axis, name in enumerate("XYZ"):
+        record[name] = np.rint(xyz_m[:, axis] / header.scales[axis]).astype(np.int32)
+    for name in ("return_number", "number_of_returns"):
+        record[name] = np.ones(len(xyz_m), np.uint8)
+    for name, values in attributes.items():
+        field = "scan_angle" if name == "ScanAngle" else STANDARD.get(name, name)
+        record[field if name in WRITABLE else name] = values
+    return record
+
+
+def _stored(path: Path, name: str, values: np.ndarray) -> np.ndarray:
+    if name == "ScanAngle":
+        return np.rint(values / SCAN_ANGLE_STEP_DEG).astype(np.int16)
+    return _whole(path, name, values)
 
 
 def _storable(values: np.ndarray) -> np.ndarray:

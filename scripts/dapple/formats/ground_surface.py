@@ -12,6 +12,8 @@ from dapple.formats.meshes import Mesh
 
 FLAT_M = 0.02
 """Ground whose heights differ by less is flat."""
+PIECE = 1_000_000
+"""Places whose height is looked up at once."""
 _HEIGHT = "ground_z_m"
 
 
@@ -57,9 +59,14 @@ class GroundSurface:
         xy = np.asarray(xy_m, np.float64)
         if self.z_m.size == 1:
             return np.full(len(xy), self.z_m[0, 0])
-        row = (xy[:, 1] - self.y_m[0]) / _step(self.y_m)
-        column = (xy[:, 0] - self.x_m[0]) / _step(self.x_m)
-        return ndimage.map_coordinates(self.z_m, [row, column], order=1, mode="nearest")
+        height = np.empty(len(xy))
+        for at in range(0, len(xy), PIECE):
+            row = (xy[at : at + PIECE, 1] - self.y_m[0]) / _step(self.y_m)
+            column = (xy[at : at + PIECE, 0] - self.x_m[0]) / _step(self.x_m)
+            height[at : at + PIECE] = ndimage.map_coordinates(
+                self.z_m, [row, column], order=1, mode="nearest"
+            )
+        return height
 
     def mesh(self, most_nodes: int | None = None) -> Mesh:
         """Two triangles and one element for each square of nodes; normals point up.

@@ -8,6 +8,9 @@ import numpy as np
 
 from dapple.formats import obj, ply
 
+PIECE = 1_000_000
+"""Triangles that are looked at together."""
+
 
 @dataclass(frozen=True)
 class Mesh:
@@ -34,8 +37,12 @@ class Mesh:
     @cached_property
     def triangle_normal(self) -> np.ndarray:
         """(t, 3) normals whose length is twice the triangle's area [m²]."""
-        a, b, c = (self.vertices_m[self.faces[:, k]] for k in range(3))
-        return np.cross(b - a, c - a)
+        normal = np.empty((len(self.faces), 3))
+        for at in range(0, len(self.faces), PIECE):
+            faces = self.faces[at : at + PIECE]
+            a, b, c = (self.vertices_m[faces[:, k]] for k in range(3))
+            normal[at : at + PIECE] = np.cross(b - a, c - a)
+        return normal
 
     @property
     def triangle_area_m2(self) -> np.ndarray:

@@ -34,8 +34,8 @@ def write(
     table["n"], table["vertex_indices"], table["element"] = 3, faces, element
     with atomic(path) as partial, partial.open("wb") as file:
         file.write(header.encode("ascii"))
-        file.write(np.ascontiguousarray(vertices, "<f8").tobytes())
-        file.write(table.tobytes())
+        np.ascontiguousarray(vertices, "<f8").tofile(file)
+        table.tofile(file)
 
 
 def read(path: str | Path) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

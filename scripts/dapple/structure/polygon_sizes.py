@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from dapple import findings
 from dapple.findings import Finding
-from dapple.structure.polygons import reconstruct
+from dapple.structure.polygons import reconstruct, slabs
 
 AUTO = "auto"
 LEAF_M = 0.05
@@ -112,7 +112,10 @@ def bracket(points_m: np.ndarray, *, seed: int, **options: Any) -> dict[str, flo
     """
     sizes = [round(share * options["voxel_size_m"], 6) for share in BRACKET]
     return {
-        f"{size:g}": reconstruct(points_m, seed=seed, **options | {"voxel_size_m": size}).area_m2
+        f"{size:g}": sum(
+            reconstruct(points_m[slab], seed=seed, **options | {"voxel_size_m": size}).area_m2
+            for slab in slabs(points_m, size)
+        )
         for size in sizes
     }
 

@@ -1,10 +1,13 @@
 """One planar polygon for the points of every small voxel, after Frey et al. (2025)."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
+from dapple.cloud import voxel_groups
 from dapple.errors import EmptyCloudError, InputError
+from dapple.formats import meshes
 from dapple.formats.meshes import Mesh
 from dapple.structure import hulls
 
@@ -84,7 +87,25 @@ def reconstruct(
             "at least one",
             "Look at what the filters left, and check the reflectance threshold.",
         )
-    index = _voxel_index(points_m, voxel_size_m, what)
+    _check_extent(points_m, voxel_size_m, what)
+    options = float(voxel_size_m), float(buffer_m), float(mitre_limit), int(seed)
+    parts = [_of_slab(points_m[slab], *options) for slab in slabs(points_m, voxel_size_m)]
+    return parts[0] if len(parts) == 1 else meshes.concatenate(parts)
+
+
+def slabs(points_m: np.ndarray, voxel_size_m: float) -> Iterator[np.ndarray]:
+    """Indices of points, slab after slab of whole voxels, as `voxel_groups.slabs` has them.
+
+    The polygons of all slabs, one after the other, are those of all points: what needs no more
+    than a sum of them takes the memory of a slab.
+    """
+    yield from voxel_groups.slabs(np.floor(points_m[:, 0] / voxel_size_m).astype(np.int64))
+
+
+def _of_slab(
+    points_m: np.ndarray, voxel_size_m: float, buffer_m: float, mitre_limit: float, seed: int
+) -> Mesh:
+    index = np.floor(points_m / voxel_size_m).astype(np.int64)
     low = index.min(axis=0)
     n_y, n_z = (index.max(axis=0) - low + 1)[1:]
     key = ((index[:, 0] - low[0]) * n_y + (index[:, 1] - low[1])) * n_z + (index[:, 2] - low[2])
@@ -96,25 +117,25 @@ def reconstruct(
         points_m[order],
         start,
         index[order[first]],
-        float(voxel_size_m),
-        float(buffer_m),
-        float(mitre_limit),
-        int(seed),
+        voxel_size_m,
+        buffer_m,
+        mitre_limit,
+        seed,
     )
     return Mesh(*hulls.fans(vertices, place, count))
 
 
-def _voxel_index(points_m: np.ndarray, voxel_size_m: float, what: str) -> np.ndarray:
-    """(n, 3) int64 index of the voxel that each point lies in."""
-    index = np.floor(points_m / voxel_size_m)
-    if not np.isfinite(index).all():
+def _check_extent(points_m: np.ndarray, voxel_size_m: float, what: str) -> None:
+    """The points are finite, and their voxels can be counted."""
+    low, high = points_m.min(axis=0), points_m.max(axis=0)
+    if not np.isfinite([low, high]).all():
         raise InputError(
             f"{what} points",
-            f"{np.count_nonzero(~np.isfinite(index).all(axis=1))} points that are not finite",
+            f"{np.count_nonzero(~np.isfinite(points_m).all(axis=1))} points that are not finite",
             "finite coordinates",
             "Filter the cloud or read the file again.",
         )
-    span = index.max(axis=0) - index.min(axis=0)
+    span = np.floor(high / voxel_size_m) - np.floor(low / voxel_size_m)
     if span.max() >= _MAX_INDEX:
         raise InputError(
             f"{what} points",
@@ -122,4 +143,3 @@ def _voxel_index(points_m: np.ndarray, voxel_size_m: float, what: str) -> np.nda
             f"at most {_MAX_INDEX} voxels on a side",
             "Remove far outliers, or cut the cloud into plots.",
         )
-    return index.astype(np.int64)

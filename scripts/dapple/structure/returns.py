@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from dapple.cloud import voxel_groups
 from dapple.errors import InputError, MissingMissesError
 from dapple.formats.shots import Shots
 from dapple.structure.traversal import HIT, NOISE, WOOD
@@ -34,15 +35,23 @@ def kinds_by_place(
     callable
         Gives the (m,) uint8 kinds of a chunk's returns, for `accumulate`.
     """
-    index = np.floor(np.asarray(points_m, np.float64) / voxel_size_m).astype(np.int64)
-    low, high = index.min(axis=0), index.max(axis=0)
+    points_m, classes = np.asarray(points_m, np.float64), np.asarray(classes)
+    low, high = (
+        np.floor(corner / voxel_size_m).astype(np.int64)
+        for corner in (points_m.min(axis=0), points_m.max(axis=0))
+    )
 
     def key(i: np.ndarray) -> np.ndarray:
         n_y, n_z = (high - low + 1)[1:]
         return ((i[:, 0] - low[0]) * n_y + i[:, 1] - low[1]) * n_z + i[:, 2] - low[2]
 
-    known, inverse = np.unique(key(index), return_inverse=True)
-    leaf = np.bincount(inverse, np.where(np.asarray(classes) == 4, 1.0, -1.0)) >= 0
+    voxels, votes = [], []
+    for slab in voxel_groups.slabs(np.floor(points_m[:, 0] / voxel_size_m).astype(np.int64)):
+        own = key(np.floor(points_m[slab] / voxel_size_m).astype(np.int64))
+        found, inverse = np.unique(own, return_inverse=True)
+        voxels.append(found)
+        votes.append(np.bincount(inverse, np.where(classes[slab] == 4, 1.0, -1.0)))
+    known, leaf = np.concatenate(voxels), np.concatenate(votes) >= 0
 
     def kinds(chunk: Shots) -> np.ndarray:
         at = np.floor(chunk.return_xyz_m / voxel_size_m).astype(np.int64)
