@@ -33,6 +33,8 @@ VARIANTS = (
     (True, True, 0.25),
 )
 PATHS_PER_M2 = 6400
+SHOOTS = {"larch": 0.06, "spruce": 0.23}
+"""Chance that light meets its own shoot again, found with rays (tests/physics/test_shoots.py)."""
 
 
 def ratios(folder: Path, name: str) -> pd.DataFrame:
@@ -48,7 +50,8 @@ def ratios(folder: Path, name: str) -> pd.DataFrame:
     trees = pd.read_csv(path / "world/trees.csv")
     here = trees.x_m.between(observed.left_m, observed.left_m + EDGE_M)
     here &= trees.y_m.between(observed.top_m - EDGE_M, observed.top_m)
-    seen_by = camera(settings.bands)
+    seen_by = camera(settings.camera_bands)
+    seen_as = json.read(path / "world/images.json")
     how = {"near_infrared": seen_by.near_infrared, "sunlit_nir": settings.retrieval.sunlit_nir}
     needles, ground = truth(settings.world, seen_by, trees[here])
     west_north = observed.left_m - origin_m[0], observed.top_m - origin_m[1]
@@ -65,10 +68,10 @@ def ratios(folder: Path, name: str) -> pd.DataFrame:
         image = coefficients.images(
             found,
             coefficients.Combinations(
-                *spectra.of_shoots(*needles, plot.shoot_recollision if shoots else 0.0),
+                *spectra.of_shoots(*needles, SHOOTS[name] if shoots else 0.0),
                 np.array(seen_by.at_centres(settings.images.bark_reflectance)),
                 ground,
-                np.array(seen_by.at_centres(plot.diffuse_share)),
+                np.array(seen_as["diffuse_share"]),
             ),
         )
         corner = {"left_m": observed.left_m, "top_m": observed.top_m}
@@ -92,7 +95,8 @@ def truth(world, seen_by: Camera, trees: pd.DataFrame):
         structure_n=trees.structure_n.to_numpy(),
         dry_matter_g_cm2=trees.dry_matter_g_cm2.to_numpy(),
         brown=trees.brown.to_numpy(),
-        water_cm=world.water_cm,
+        water_cm=trees.water_cm.to_numpy(),
+        chlorophyll_per_carotenoid=trees.chlorophyll_per_carotenoid.to_numpy(),
     )
     places = np.random.default_rng(1).uniform(0, 50, (2000, 2))
     ground = plot_optics.ground_patches(

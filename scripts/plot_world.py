@@ -35,9 +35,10 @@ def main(snakemake):
     trees["sampled"] = plots.sample(
         trees, size_m, settings["field_trees"], stream_seed(seed, "sampled")
     )
-    names = ("lcc", "structure_n", "dry_matter_g_cm2", "brown")
-    of_needles = {name: settings[name] for name in names}
-    trees = trees.join(plot_trees.chemistry(len(trees), **of_needles, seed=seed))
+    chemistry = plot_trees.chemistry(
+        len(trees), lcc=settings["lcc"], others=settings["chemistry"], seed=seed
+    )
+    trees = trees.join(chemistry)
     rings = plots.rings(trees, outlines)
     for k, tree in enumerate(grown):
         meshes.write_ply(output.leaves[k], tree.leaves)

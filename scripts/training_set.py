@@ -1,6 +1,7 @@
 """Simulate images of many leaves and soils and average their canopy pixels over cells."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from dapple.formats import json, meshes, rasters, tables
 from dapple.optics.cameras import camera
 from dapple.retrieval import coefficient_files as files
 from dapple.retrieval import coefficients, prosail, semiless, spectra, training_entries
+from dapple.retrieval.flight_light import shares
 from dapple.workflow import options, run
 
 
@@ -20,14 +22,14 @@ def main(snakemake):
     leaves, properties = spectra.combinations(
         settings, settings["combinations"], seen_by, seed=params["seed"]
     )
+    share = shares(json.read(snakemake.input.sky), leaves["aerosol_optical_depth"].to_numpy())
     origin_m = json.read(snakemake.input.summary)["world_origin_m"]
     if params["model"] == "prosail":
         chunks, mask, pixel_m = level_canopies(
-            snakemake.input, canopy, properties, origin_m, params
+            snakemake.input, canopy, properties, share, origin_m, params
         )
     else:
         (path,) = snakemake.input.simulation
-        share = np.asarray(json.read(snakemake.input.sky)["diffuse_share"])
         chunks, window = images(path, properties, params["model"], params["bark"], share)
         check_window(window, canopy, origin_m, path)
         mask, pixel_m = canopy.values[0] > 0, canopy.pixel_m
@@ -53,14 +55,14 @@ def images(path, properties, model, bark, share):
     """Chunks of pixels of images by three-dimensional transport, and their grid."""
     leaf = (properties.leaf_reflectance, properties.leaf_transmittance)
     if model == "semi_less":
-        fitted = files.read_semiless(path)
+        fitted = replace(files.read_semiless(path), diffuse_share=share)
         return semiless.image_chunks(fitted, *leaf, properties.soil_reflectance), fitted.window
     traced = files.read(path)
     all_of_it = coefficients.Combinations(*leaf, bark, properties.soil_reflectance, share)
     return coefficients.image_chunks(traced, all_of_it), traced.window
 
 
-def level_canopies(inputs, canopy, properties, origin_m, params):
+def level_canopies(inputs, canopy, properties, share, origin_m, params):
     """SAIL of every cell with plants and canopy pixels, as pixels as large as cells."""
     cell_m = params["selection"]["cell_m"]
     over = training_entries.cells(canopy.values.shape[1:], pixel_m=canopy.pixel_m, cell_m=cell_m)
@@ -75,7 +77,7 @@ def level_canopies(inputs, canopy, properties, origin_m, params):
     print(f"plant area index of {mask.sum()} cells: mean {index[mask].mean():.2f}")
     values = prosail.images(
         index, properties, sun_zenith_deg=json.read(inputs.sun)["sun_zenith_deg"],
-        diffuse_share=np.asarray(json.read(inputs.sky)["diffuse_share"]), **params["sail"],
+        diffuse_share=share, **params["sail"],
     )  # fmt: skip
     return [(slice(0, len(values)), values)], mask, cell_m
 

@@ -7,8 +7,10 @@ import numpy as np
 from dapple.formats import json, meshes, rasters, tables
 from dapple.formats.rasters import Raster
 from dapple.optics import cameras
+from dapple.optics.bands import camera_mean
+from dapple.sky import spectrum
 from dapple.streams import stream_seed
-from dapple.virtual import camera
+from dapple.virtual import camera, plot_optics
 from dapple.virtual.plot_materials import assemble
 from dapple.workflow import options, peak_rss_mb, run
 
@@ -19,16 +21,20 @@ def main(snakemake):
     origin_m = np.asarray(settings["origin_m"], float)
     trees = tables.read(inputs.trees)
     trees[["x_m", "y_m", "z_m"]] -= origin_m
-    seen_by = cameras.camera(settings["bands"], *inputs.responses)
+    seen_by = plot_optics.as_built(
+        cameras.camera(settings["bands"], *inputs.responses),
+        **settings["camera"],
+        seed=stream_seed(seed, "camera"),
+    )
     world, materials = assemble(
         trees,
         [meshes.read_ply(path) for path in inputs.leaves],
         [meshes.read_ply(path) for path in inputs.wood],
         meshes.read_ply(inputs.terrain),
         seen_by,
+        crown=settings["crown"],
         ground=settings["ground"],
-        ground_seed=stream_seed(seed, "ground"),
-        **{name: settings[name] for name in ("lowest_to_highest_lcc", "lcc_layers", "water_cm")},
+        seed=seed,
     )
     scene = camera.build(world, materials)
     print(f"{len(world.faces)} triangles, {len(materials.reflectance)} materials")
@@ -36,12 +42,16 @@ def main(snakemake):
     built = time.perf_counter()
     view = camera.View.over(settings["size_m"], settings["pixel_m"])
     paths, sun = settings["paths_per_pixel"], json.read(inputs.sun)
+    sky = spectrum.cloudless_diffuse_share(
+        sun["sun_zenith_deg"], aerosol_optical_depth_500nm=settings["aerosol_optical_depth"]
+    )
+    diffuse_share = camera_mean(*sky, seen_by)
     image = camera.photograph(
         scene,
         view,
         sun_zenith_deg=sun["sun_zenith_deg"],
         sun_azimuth_deg=sun["sun_azimuth_deg"],
-        diffuse_share=json.read(inputs.sky)["diffuse_share"],
+        diffuse_share=diffuse_share,
         paths_per_pixel=[paths[seen_by.is_infrared(k)] for k in range(0, len(seen_by), 3)],
         seed=stream_seed(seed, "paths"),
     )
@@ -60,6 +70,7 @@ def main(snakemake):
     facts = {
         "rows": view.rows,
         "columns": view.columns,
+        "diffuse_share": diffuse_share,
         "mean_reflectance": image.mean(axis=(1, 2)).astype(float),
         "build_s": built - begun,
         "trace_s": time.perf_counter() - built,

@@ -94,6 +94,24 @@ WORLD_FLIGHT = {
     "min_separation_m": WORLD.lidar_separation_m,
     "max_returns": WORLD.lidar_returns,
 }
+WORLD_CHEMISTRY = {
+    "structure_n": WORLD.needle_structure,
+    "dry_matter_g_cm2": WORLD.dry_matter_g_cm2,
+    "brown": WORLD.brown,
+    "chlorophyll_per_carotenoid": WORLD.chlorophyll_per_carotenoid,
+    "water_cm": WORLD.water_cm,
+}
+CROWN_KEYS = {
+    "lowest_to_highest_lcc",
+    "lcc_layers",
+    "leaves_per_layer",
+    "within_tree_sd",
+}
+WORLD_CROWN = WORLD.model_dump(include=CROWN_KEYS)
+WORLD_CAMERA = {
+    "centre_sd_nm": WORLD.band_centre_sd_nm,
+    "width_sd": WORLD.band_width_sd,
+}
 WORLD_GROUND = {
     "brightness": WORLD.soil_brightness,
     "moisture": WORLD.soil_moisture,
@@ -119,7 +137,7 @@ def plot_tree(wildcards):
 def plot_light(wildcards):
     """What is stated of the sun and sky of a plot's images."""
     stated = {"sun_zenith_deg", "sun_azimuth_deg", "diffuse_share", "time", "timezone"}
-    return plot_of(wildcards).model_dump(include=stated)
+    return {"diffuse_share": ()} | plot_of(wildcards).model_dump(include=stated)
 
 
 def plot_planting(wildcards):
@@ -140,26 +158,20 @@ RANGES = (
     "brown",
     "soil_brightness",
     "soil_moisture",
+    "chlorophyll_per_carotenoid",
+    "water_cm",
+    "shoot_recollision",
+    "aerosol_optical_depth",
 )
 LEAVES_AND_SOILS = {
     "ranges": {name: getattr(RETRIEVAL, name) for name in RANGES},
     "combinations": RETRIEVAL.combinations,
     "jitter_steps": RETRIEVAL.jitter_steps,
-    "chlorophyll_per_carotenoid": RETRIEVAL.chlorophyll_per_carotenoid,
     "anthocyanin_per_chlorophyll": RETRIEVAL.anthocyanin_per_chlorophyll,
-    "water_cm": RETRIEVAL.water_cm,
     "prospect_version": RETRIEVAL.prospect_version,
     "soil_vectors": RETRIEVAL.soil_vectors
     and str(Path(settings.data_dir) / RETRIEVAL.soil_vectors),
 }
-
-
-def leaves_and_soils(wildcards):
-    """What leaves and soils to simulate for a plot."""
-    return LEAVES_AND_SOILS | {
-        "shoot_recollision": plot_of(wildcards).shoot_recollision
-    }
-
 
 SELECTION = {
     "cell_m": RETRIEVAL.map_pixel_m,

@@ -105,7 +105,7 @@ rule image_comparison:
         mem_mb=memory(3000),
     params:
         bands=BANDS,
-        leaves_and_soils=leaves_and_soils,
+        leaves_and_soils=LEAVES_AND_SOILS,
         bark=BARK,
         direct_renders=IMAGES.direct_renders,
         direct_paths=IMAGES.direct_paths,

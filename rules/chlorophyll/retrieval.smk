@@ -68,7 +68,7 @@ rule training_set:
         mem_mb=memory(4000),
     params:
         bands=BANDS,
-        leaves_and_soils=leaves_and_soils,
+        leaves_and_soils=LEAVES_AND_SOILS,
         bark=BARK,
         selection=SELECTION,
         max_entries=RETRIEVAL.max_entries,

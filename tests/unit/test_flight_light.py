@@ -50,6 +50,15 @@ def test_a_cloudless_sky_gives_the_shares_of_the_published_flights(zenith_deg, p
     assert found["diffuse_share"] == pytest.approx(published, abs=0.02)
     stated = flight_light.diffuse_share(((400.0, 0.4), (900.0, 0.4)), zenith_deg, ZHAO)
     assert stated["diffuse_share"] == pytest.approx([0.4] * 5)
+    assert flight_light.shares(stated, np.array([0.05, 0.3])) == pytest.approx(0.4)
+
+
+def test_the_more_aerosol_the_more_of_the_light_comes_from_the_sky():
+    sky = flight_light.diffuse_share((), 40.0, ZHAO)
+    found = flight_light.shares(sky, np.array([0.1, 0.15, 0.3]))
+    assert found.shape == (3, 5)
+    assert found[0] == pytest.approx(sky["diffuse_share"])
+    assert (np.diff(found, axis=0) > 0).all()
 
 
 @pytest.mark.parametrize("name", CAMERAS)

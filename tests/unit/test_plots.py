@@ -6,6 +6,7 @@ import pytest
 
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
+from dapple.optics.bands import camera_mean
 from dapple.optics.cameras import ZHAO
 from dapple.virtual import plot_optics, plots, terrain
 from dapple.virtual.crown_outlines import area_m2, outline
@@ -127,7 +128,7 @@ def test_the_terrain_mesh_fills_its_rectangle_facing_up():
 
 
 LCC = {"mean_ug_cm2": 39.9, "sd_ug_cm2": 10.8, "range_ug_cm2": (10.0, 70.0)}
-SOIL = {"brightness": 0.55, "moisture": 0.4, "litter_share": 0.4}
+SOIL = {"brightness": 1.0, "moisture": 0.4, "litter_share": 0.4}
 
 
 def test_chlorophyll_follows_the_table():
@@ -147,9 +148,33 @@ def test_a_mean_outside_its_range_is_refused():
 def test_layers_keep_the_mean_of_the_tree(ratio):
     rng = np.random.default_rng(1)
     layer, area = rng.integers(0, 5, 1000), rng.uniform(0.001, 0.02, 1000)
-    factor = plot_optics.layer_factor(layer, area, 5, ratio)
+    factor = plot_optics.part_factor(layer, area, np.zeros((5, 1)), ratio)
     assert (factor[layer] * area).sum() == pytest.approx(area.sum())
     assert factor[0] / factor[-1] == pytest.approx(ratio)
+
+
+def test_kinds_of_shoots_differ_about_the_mean_of_their_tree():
+    rng = np.random.default_rng(2)
+    part, area = rng.integers(0, 15, 3000), rng.uniform(0.001, 0.02, 3000)
+    deviation = rng.normal(0.0, 0.1, (5, 3))
+    factor = plot_optics.part_factor(part, area, deviation, 1.0)
+    assert (factor[part] * area).sum() == pytest.approx(area.sum())
+    assert factor / factor[0] == pytest.approx((1 + deviation).ravel() / (1 + deviation[0, 0]))
+
+
+def test_a_camera_as_built_has_bells_beside_its_windows():
+    nm = np.arange(400.0, 1000.0)
+    true = plot_optics.as_built(ZHAO, centre_sd_nm=0.0, width_sd=0.0, seed=1)
+    for band, bell in zip(ZHAO, true, strict=True):
+        at, response = np.array(bell.response).T
+        above = np.interp(nm, at, response, 0, 0) > 0.5
+        assert np.ptp(nm[above]) == pytest.approx(band.width_nm, abs=3)
+    moved = camera_mean(nm, nm, plot_optics.as_built(ZHAO, centre_sd_nm=2.0, width_sd=0.1, seed=1))
+    beside = np.abs(moved - [band.centre_nm for band in ZHAO])
+    assert 0.2 < beside.mean() < 4.0
+    assert moved == pytest.approx(
+        camera_mean(nm, nm, plot_optics.as_built(ZHAO, centre_sd_nm=2.0, width_sd=0.1, seed=1))
+    )
 
 
 def test_the_lowest_shoots_are_in_the_lowest_layer():
@@ -167,6 +192,7 @@ def test_more_chlorophyll_means_darker_needles_in_red_edge_and_not_in_infrared()
         dry_matter_g_cm2=0.012,
         brown=0.05,
         water_cm=0.015,
+        chlorophyll_per_carotenoid=4.0,
     )
     assert (reflectance[0, 1:4] > reflectance[1, 1:4]).all()
     assert reflectance[0, 4] == pytest.approx(reflectance[1, 4], rel=0.01)

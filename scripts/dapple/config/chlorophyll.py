@@ -59,9 +59,6 @@ class OwnPlot(Section):
         "of the light on level ground, from the sky: wavelength [nm] and share, linear between; "
         "empty: a cloudless sky",
     )
-    shoot_recollision: Annotated[float, Ge(0), Lt(1)] = key(
-        0.0, "chance that light scattered by a needle meets its own shoot; 0: broad leaves"
-    )
 
 
 class Plot(Section):
@@ -81,17 +78,7 @@ class Plot(Section):
     crown_leaf_area_index: Positive = key(3.0, "leaf area over the area of the crown's outline")
     sun_zenith_deg: Annotated[float, Ge(0), Le(80)] = key(58.0, "of the images", ZHAO)
     sun_azimuth_deg: Annotated[float, Ge(0), Le(360)] = key(266.32, "of the images", ZHAO)
-    diffuse_share: Spectrum = key(
-        ((450.0, 0.32), (560.0, 0.19), (650.0, 0.14), (730.0, 0.11), (840.0, 0.09)),
-        "of the light on level ground, from the sky: wavelength [nm] and share, linear between",
-        "SPECTRL2 (Bird and Riordan 1986), aerosol optical depth 0.1 at 500 nm",
-    )
     pixel_m: Positive = key(0.04, "of the images", ZHAO)
-    shoot_recollision: Annotated[float, Ge(0), Lt(1)] = key(
-        0.0,
-        "chance that light scattered by a needle meets its own shoot; rays in the virtual shoots",
-        "Smolander and Stenberg 2003: 0.47 in Scots pine",
-    )
     field_trees: Count = key(28, "trees with measured chlorophyll", ZHAO)
 
 
@@ -108,11 +95,18 @@ class World(Section):
     )
     lcc_mean_ug_cm2: Positive = key(39.9, "mean leaf chlorophyll of the trees", ZHAO)
     lcc_sd_ug_cm2: Positive = key(10.8, "standard deviation between trees", ZHAO)
-    lcc_range_ug_cm2: tuple[Positive, Positive] = key((10.0, 70.0), "no tree lies outside", ZHAO)
+    lcc_range_ug_cm2: tuple[Positive, Positive] = key((5.0, 85.0), "no tree lies outside")
     lowest_to_highest_lcc: Annotated[float, Gt(0.3), Lt(3)] = key(
-        1.0, "chlorophyll of the lowest needles over the highest; a tree's value is their mean"
+        0.8, "chlorophyll of the lowest needles over the highest; a tree's value is their mean"
     )
     lcc_layers: Annotated[int, Ge(1), Le(20)] = key(5, "steps in which it changes with height")
+    leaves_per_layer: Annotated[int, Ge(1), Le(20)] = key(3, "kinds of shoots in each of them")
+    within_tree_sd: Share = key(
+        0.1, "standard deviation between these kinds, of chlorophyll and dry matter, as a share"
+    )
+    chlorophyll_per_carotenoid: tuple[Positive, NotNegative] = key(
+        (5.4, 0.5), "mean and standard deviation between trees"
+    )
     needle_structure: tuple[Positive, NotNegative] = key(
         (1.6, 0.1), "PROSPECT's N, mean and standard deviation between trees"
     )
@@ -122,7 +116,9 @@ class World(Section):
     brown: tuple[NotNegative, NotNegative] = key(
         (0.05, 0.03), "brown pigments, mean and standard deviation between trees"
     )
-    water_cm: NotNegative = key(0.015, "equivalent water thickness", ZHAO)
+    water_cm: tuple[NotNegative, NotNegative] = key(
+        (0.02, 0.004), "equivalent water thickness, mean and standard deviation between trees"
+    )
     shoot_length_m: Positive = key(0.16, "strips of needles that make up a shoot")
     strip_width_m: Positive = key(0.02, "of these strips")
     strips_per_shoot: Annotated[int, Ge(1), Le(20)] = key(4, "strips around the axis of a shoot")
@@ -130,8 +126,8 @@ class World(Section):
     wave_height_m: NotNegative = key(1.5, "greatest height of the ground's waves")
     wave_length_m: Positive = key(30.0, "longest of these waves; the shortest is half as long")
     terrain_step_m: Positive = key(0.25, "edge of the ground's triangles and of its colours")
-    soil_brightness: Share = key(0.55, "of the dry and the wet soil of prosail")
-    soil_moisture: Share = key(0.4, "mean over the ground")
+    soil_brightness: Positive = key(1.0, "of a brown forest soil, as a factor")
+    soil_moisture: Share = key(0.4, "mean over the ground, as a share of saturation")
     litter_share: Share = key(0.4, "of the ground, under litter of needles; mean")
     ground_variation: Share = key(0.2, "standard deviation of soil_moisture and litter_share")
     lidar_height_m: Annotated[float, Ge(10)] = key(50.0, "of the UAV above the mean ground", ZHAO)
@@ -146,6 +142,13 @@ class World(Section):
     lidar_range_noise_m: NotNegative = key(0.015, "standard deviation of one echo's range")
     lidar_separation_m: NotNegative = key(0.5, "nearer echoes of a pulse merge")
     lidar_returns: Annotated[int, Ge(1), Le(15)] = key(5, "returns that a pulse has at most")
+    aerosol_optical_depth: Annotated[float, Ge(0), Le(2)] = key(
+        0.18, "at 500 nm, while the images are taken", "SPECTRL2 (Bird and Riordan 1984)"
+    )
+    band_centre_sd_nm: NotNegative = key(2.0, "of the camera's bands about their nominal centres")
+    band_width_sd: Annotated[float, Ge(0), Le(0.3)] = key(
+        0.08, "of their widths about the nominal ones, as a share; bands are bells, not windows"
+    )
     paths_per_pixel: tuple[Annotated[int, Ge(1), Le(4096)], Annotated[int, Ge(1), Le(4096)]] = key(
         (12, 32), "of the observed images, visible and infrared: scattered more often there"
     )
@@ -244,17 +247,27 @@ class Retrieval(Section):
     max_entries: Count = key(200_000, "entries kept of more, drawn by chance; 182,560 published")
     n: GridRange = key((1.0, 2.5, 4), "leaf structure: least, most, levels of the grid", ZHAO)
     chlorophyll_ug_cm2: GridRange = key((10.0, 70.0, 13), "chlorophyll a and b per leaf area", ZHAO)
-    chlorophyll_per_carotenoid: Positive = key(4.0, "carotenoids follow from chlorophyll", ZHAO)
+    chlorophyll_per_carotenoid: GridRange = key(
+        (2.5, 7.0, 4), "carotenoids follow from chlorophyll", "Lichtenthaler and Buschmann 2001"
+    )
     anthocyanin_per_chlorophyll: NotNegative = key(
         0.043,
         "PROSPECT-D: what green leaves hold; PROSPECT-5 counts it as chlorophyll",
         "larch and birch leaves in the spectral database of LESS",
     )
     dry_matter_g_cm2: GridRange = key((0.0, 0.03, 4), "dry matter per leaf area", ZHAO)
-    water_cm: NotNegative = key(0.015, "equivalent water thickness", ZHAO)
+    water_cm: GridRange = key((0.005, 0.03, 4), "equivalent water thickness", "Feret et al. 2008")
     brown: GridRange = key((0.0, 0.8, 5), "brown pigments", ZHAO)
     soil_brightness: GridRange = key((0.01, 0.7, 4), "of the soil", ZHAO)
     soil_moisture: GridRange = key((0.01, 0.78, 4), "of the soil, a share of saturation", ZHAO)
+    shoot_recollision: GridRange = key(
+        (0.0, 0.68, 4),
+        "chance that light scattered by a needle meets its own shoot; [0, 0, 1]: broad leaves",
+        "1 - 4 STAR (Smolander and Stenberg 2003) of 305 Scots pine shoots (Stenberg et al. 1994)",
+    )
+    aerosol_optical_depth: GridRange = key(
+        (0.03, 0.5, 4), "at 500 nm, on clear days; not used where diffuse_share is stated"
+    )
     jitter_steps: NotNegative = key(0.5, "deviation of the jitter, in grid steps", ZHAO)
     prospect_version: Literal["5", "D"] = key("D", "calibration of PROSPECT")
     soil_vectors: str = key(
@@ -304,7 +317,7 @@ class Chlorophyll(Section):
         "", "CSV of wavelength_nm and a response by name of band, relative to data_dir; empty: flat"
     )
     margin_m: NotNegative = key(10.0, "surroundings of a plot that shade it")
-    larch: Plot = Plot(shoot_recollision=0.06)
+    larch: Plot = Plot()
     spruce: Plot = Plot(
         size_m=(20.0, 30.0),
         cover=0.42,
@@ -316,11 +329,9 @@ class Chlorophyll(Section):
         crown_base_share=0.12,
         dbh_m=0.16,
         crown_leaf_area_index=4.5,
-        diffuse_share=((450.0, 0.24), (560.0, 0.14), (650.0, 0.11), (730.0, 0.09), (840.0, 0.07)),
         sun_zenith_deg=38.53,
         sun_azimuth_deg=242.81,
         pixel_m=0.026,
-        shoot_recollision=0.23,
         field_trees=17,
     )
     user: OwnPlot = OwnPlot()

@@ -38,13 +38,19 @@ above, leaf area index 1, leaf angles of a sphere and the soils of prosail half 
 under an even sky. A test computes it again."""
 
 CONIFER_BARK = {
-    "wavelength_nm": (400.0, 450.0, 560.0, 650.0, 730.0, 840.0, 900.0),
-    "reflectance": (0.06, 0.07, 0.11, 0.16, 0.23, 0.31, 0.34),
+    "wavelength_nm": (400.0, 450.0, 560.0, 650.0, 730.0, 840.0, 900.0, 1000.0),
+    "reflectance": (0.06, 0.07, 0.11, 0.16, 0.23, 0.31, 0.34, 0.37),
 }
 """Assumed: rough bark of conifers, browner and brighter towards the infrared."""
 
+FOREST_SOIL = {
+    "wavelength_nm": (400.0, 450.0, 560.0, 650.0, 730.0, 840.0, 900.0, 1000.0),
+    "reflectance": (0.05, 0.065, 0.12, 0.19, 0.24, 0.28, 0.29, 0.32),
+}
+"""Assumed: a brown forest soil when dry, redder than the soils that retrieval mixes."""
+
 LITTER = {
-    "wavelength_nm": (400.0, 450.0, 560.0, 650.0, 730.0, 840.0, 900.0),
-    "reflectance": (0.05, 0.06, 0.11, 0.17, 0.23, 0.31, 0.34),
+    "wavelength_nm": (400.0, 450.0, 560.0, 650.0, 730.0, 840.0, 900.0, 1000.0),
+    "reflectance": (0.05, 0.06, 0.11, 0.17, 0.23, 0.31, 0.34, 0.37),
 }
 """Assumed: dry litter of needles, without the green peak and the red edge of living leaves."""

@@ -132,7 +132,7 @@ class Combinations:
     ----------
     leaf_reflectance, leaf_transmittance, bark, soil : (n, b) float
         0 to 1.
-    diffuse_share : (b,) float
+    diffuse_share : (b,) or (n, b) float
         Of the light on level ground that comes from the sky, not from the sun.
     """
 

@@ -17,6 +17,9 @@ from dapple.sky import spectrum
 from dapple.sky import sun as solar
 
 LOWEST_SUN_ZENITH_DEG = 80.0
+OPTICAL_DEPTHS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8)
+"""Of aerosol at 500 nm, for which the sky is computed; linear between."""
+USUAL = OPTICAL_DEPTHS.index(0.1)
 
 
 def sun(stated: Mapping[str, Any], images: Raster | None) -> dict[str, Any]:
@@ -89,10 +92,37 @@ def diffuse_share(
     Returns
     -------
     dict
-        `diffuse_share` of every band, and `told_by`.
+        `diffuse_share` of every band, as stated or with little aerosol; `aerosol_optical_depth`
+        (k,) and the shares with it, `by_optical_depth` (k, b); and `told_by`.
     """
     if stated:
-        return {"diffuse_share": seen_by.at_centres(stated), "told_by": "as stated"}
-    nm, share = spectrum.cloudless_diffuse_share(sun_zenith_deg)
-    means = np.round(camera_mean(nm, share, seen_by), 4)
-    return {"diffuse_share": means.tolist(), "told_by": "SPECTRL2, a cloudless sky"}
+        told = list(seen_by.at_centres(stated))
+        table = {"aerosol_optical_depth": [0.0], "by_optical_depth": [told]}
+        return {"diffuse_share": told, "told_by": "as stated"} | table
+    rows = []
+    for depth in OPTICAL_DEPTHS:
+        nm, share = spectrum.cloudless_diffuse_share(
+            sun_zenith_deg, aerosol_optical_depth_500nm=depth
+        )
+        rows.append(np.round(camera_mean(nm, share, seen_by), 4).tolist())
+    return {
+        "diffuse_share": rows[USUAL],
+        "told_by": "SPECTRL2, a cloudless sky",
+        "aerosol_optical_depth": list(OPTICAL_DEPTHS),
+        "by_optical_depth": rows,
+    }
+
+
+def shares(sky: Mapping[str, Any], optical_depth: np.ndarray) -> np.ndarray:
+    """Shares of skylight (n, b) with aerosol of n optical depths.
+
+    Parameters
+    ----------
+    sky : mapping
+        From `diffuse_share`. Where the shares were stated, aerosol changes nothing.
+    optical_depth : (n,) float
+        At 500 nm.
+    """
+    by_band = np.transpose(sky["by_optical_depth"])
+    known = sky["aerosol_optical_depth"]
+    return np.column_stack([np.interp(optical_depth, known, band) for band in by_band])

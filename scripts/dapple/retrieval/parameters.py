@@ -29,9 +29,7 @@ def draw(
     seed: int,
     table: Mapping[str, Range],
     jitter_steps: float,
-    chlorophyll_per_carotenoid: float,
     anthocyanin_per_chlorophyll: float,
-    water_cm: float,
 ) -> pd.DataFrame:
     """Draw combinations of leaf and soil parameters.
 
@@ -42,21 +40,19 @@ def draw(
     seed : int
         Of the random order and jitter.
     table : mapping of str to Range
-        The parameters that vary: PROSPECT's (`optics.leaf`), `soil_brightness`, `soil_moisture`.
+        The parameters that vary: PROSPECT's (`optics.leaf`) with `chlorophyll_per_carotenoid` in
+        place of carotenoids, `soil_brightness`, `soil_moisture`, `shoot_recollision` and
+        `aerosol_optical_depth`.
     jitter_steps : float
         Standard deviation of the Gaussian jitter, in grid steps.
-    chlorophyll_per_carotenoid : float
-        Carotenoids follow from chlorophyll.
     anthocyanin_per_chlorophyll : float
-        So does anthocyanin: see Notes.
-    water_cm : float
-        Equivalent water thickness, which the camera hardly sees [cm].
+        Anthocyanin follows from chlorophyll: see Notes.
 
     Returns
     -------
     DataFrame
         One row per combination: the columns of `table`, `carotenoids_ug_cm2`,
-        `anthocyanin_ug_cm2`, `water_cm`.
+        `anthocyanin_ug_cm2`.
 
     Raises
     ------
@@ -90,7 +86,6 @@ def draw(
         jitter = rng.normal(0.0, jitter_steps * bounds.step, n_combinations)
         columns[name] = np.clip(node + jitter, bounds.low, bounds.high)
     frame = pd.DataFrame(columns)
-    frame["carotenoids_ug_cm2"] = frame["chlorophyll_ug_cm2"] / chlorophyll_per_carotenoid
+    frame["carotenoids_ug_cm2"] = frame["chlorophyll_ug_cm2"] / frame["chlorophyll_per_carotenoid"]
     frame["anthocyanin_ug_cm2"] = frame["chlorophyll_ug_cm2"] * anthocyanin_per_chlorophyll
-    frame["water_cm"] = water_cm
     return frame

@@ -59,7 +59,7 @@ def images(
         Leaves and soils of n combinations.
     sun_zenith_deg : float
         Below 90.
-    diffuse_share : (b,) float
+    diffuse_share : (b,) or (n, b) float
         Share of the irradiance of level ground that comes from the sky.
     leaf_angle_deg : float
         Mean of the ellipsoidal leaf angle distribution.

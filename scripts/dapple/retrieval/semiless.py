@@ -51,7 +51,7 @@ class Fitted:
         The pixels.
     terms : (2, 4, m, pixels) float32
         Under sun and sky: ρ_so, T1, ρ_dd and ρ_dd T2; their polynomials in ascending powers.
-    diffuse_share : (b,) float64
+    diffuse_share : (b,) or (n, b) float64
         Of the light on level ground that comes from the sky, in the bands of the images.
     """
 

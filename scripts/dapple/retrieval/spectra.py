@@ -34,8 +34,7 @@ def combinations(
     ----------
     settings : dict
         `ranges` (least, most and levels by parameter), `jitter_steps`,
-        `chlorophyll_per_carotenoid`, `anthocyanin_per_chlorophyll`, `water_cm`, `soil_vectors`,
-        `prospect_version` and `shoot_recollision`.
+        `anthocyanin_per_chlorophyll`, `soil_vectors` and `prospect_version`.
     number : int
         How many.
     camera : Camera
@@ -56,16 +55,13 @@ def combinations(
         seed=seed,
         table={name: parameters.Range(*row) for name, row in ranges.items()},
         jitter_steps=settings["jitter_steps"],
-        chlorophyll_per_carotenoid=settings["chlorophyll_per_carotenoid"],
         anthocyanin_per_chlorophyll=settings["anthocyanin_per_chlorophyll"],
-        water_cm=settings["water_cm"],
     )
     return drawn, spectra(
         drawn,
         choose(camera, settings["soil_vectors"]),
         camera,
         prospect_version=settings["prospect_version"],
-        shoot_recollision=settings["shoot_recollision"],
     )
 
 
@@ -75,22 +71,20 @@ def spectra(
     camera: Camera,
     *,
     prospect_version: str = "D",
-    shoot_recollision: float = 0.0,
 ) -> Spectra:
     """Optical properties of every combination.
 
     Parameters
     ----------
     drawn : DataFrame
-        From `parameters.draw`: PROSPECT's arguments, `soil_brightness`, `soil_moisture`.
+        From `parameters.draw`: PROSPECT's arguments, `soil_brightness`, `soil_moisture`,
+        `shoot_recollision`.
     soil : callable
         From `optics.soil`: brightness and moisture (n,) to reflectance (n, b).
     camera : Camera
         Of the same bands as the soil.
     prospect_version : {"5", "D"}
         Calibration of PROSPECT. To "5" the anthocyanin of green leaves is part of chlorophyll.
-    shoot_recollision : float
-        See `of_shoots`; 0: single leaves.
 
     Returns
     -------
@@ -100,13 +94,14 @@ def spectra(
     if prospect_version == "5":
         leaf["anthocyanin_ug_cm2"] = 0.0
     reflectance, transmittance = camera_leaves(camera, **leaf, prospect_version=prospect_version)
-    reflectance, transmittance = of_shoots(reflectance, transmittance, shoot_recollision)
+    recollision = drawn["shoot_recollision"].to_numpy(float)[:, None]
+    reflectance, transmittance = of_shoots(reflectance, transmittance, recollision)
     ground = soil(drawn["soil_brightness"].to_numpy(float), drawn["soil_moisture"].to_numpy(float))
     return Spectra(reflectance, transmittance, ground)
 
 
 def of_shoots(
-    reflectance: np.ndarray, transmittance: np.ndarray, recollision: float
+    reflectance: np.ndarray, transmittance: np.ndarray, recollision: np.ndarray | float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Optical properties of shoots whose needles light meets again before it leaves them.
 
@@ -118,7 +113,7 @@ def of_shoots(
     ----------
     reflectance, transmittance : (...) float
         Of needles, 0 to 1.
-    recollision : float
+    recollision : float or array that broadcasts
         The chance p, from 0 to below 1.
 
     Returns

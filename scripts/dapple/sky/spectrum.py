@@ -89,8 +89,16 @@ def par_spectrum(
     )
 
 
-def cloudless_diffuse_share(sun_zenith_deg: float) -> tuple[np.ndarray, np.ndarray]:
+def cloudless_diffuse_share(
+    sun_zenith_deg: float, **atmosphere: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Share of skylight in the light on level ground under a cloudless sky, at sea level.
+
+    Parameters
+    ----------
+    sun_zenith_deg : float
+    **atmosphere
+        As in `Atmosphere`.
 
     Returns
     -------
@@ -102,7 +110,7 @@ def cloudless_diffuse_share(sun_zenith_deg: float) -> tuple[np.ndarray, np.ndarr
     Bird and Riordan (1984), through pvlib. The day of the year changes light, and not its shares.
     """
     zenith = np.minimum([float(sun_zenith_deg)], MAX_ZENITH_DEG)
-    nm, beam, sky = _cloudless(zenith, np.ones(1, int), 0.0, Atmosphere())
+    nm, beam, sky = _cloudless(zenith, np.ones(1, int), 0.0, Atmosphere(**atmosphere))
     used = (nm >= 300.0) & (nm <= 1100.0)
     sky, beam = sky[0, used], beam[0, used] * np.cos(np.radians(zenith[0]))
     return nm[used], sky / np.maximum(sky + beam, np.finfo(float).tiny)

@@ -9,6 +9,7 @@ import pandas as pd
 from dapple.formats.meshes import Mesh, concatenate
 from dapple.optics.cameras import Camera
 from dapple.optics.default_spectra import CONIFER_BARK
+from dapple.streams import stream_seed
 from dapple.virtual import plot_optics, plots
 from dapple.virtual.plot_optics import Materials
 
@@ -20,11 +21,9 @@ def assemble(
     terrain: Mesh,
     camera: Camera,
     *,
-    lowest_to_highest_lcc: float,
-    lcc_layers: int,
-    water_cm: float,
+    crown: Mapping[str, Any],
     ground: Mapping[str, Any],
-    ground_seed: int,
+    seed: int,
 ) -> tuple[Mesh, Materials]:
     """The plot as one mesh, and what every triangle is made of.
 
@@ -37,25 +36,23 @@ def assemble(
     terrain : Mesh
     camera : Camera
         For whose bands.
-    lowest_to_highest_lcc : float
-        Chlorophyll of the lowest layer of a crown over that of the highest.
-    lcc_layers : int
-        Layers of a crown, each with its own chlorophyll.
-    water_cm : float
-        Of the needles.
+    crown : mapping
+        `lowest_to_highest_lcc`: chlorophyll of the lowest layer of a crown over that of the
+        highest; `lcc_layers`; `leaves_per_layer`, kinds of shoots in each layer; and
+        `within_tree_sd`, their standard deviation of chlorophyll and dry matter as a share.
     ground : mapping
         Of `plot_optics.ground_patches`.
-    ground_seed : int
+    seed : int
+        Of the kinds of shoots and of the ground.
     """
     leaves, _ = plots.place(list(grown_leaves), trees)
     wood, _ = plots.place(list(grown_wood), trees)
-    n_layers = lcc_layers if lowest_to_highest_lcc != 1 else 1
     (reflectance, transmittance), of_leaf = _needles(
-        grown_leaves, trees, camera, n_layers, lowest_to_highest_lcc, water_cm
+        grown_leaves, trees, camera, crown, np.random.default_rng(stream_seed(seed, "shoots"))
     )
     bark = plot_optics.in_bands(CONIFER_BARK, camera)
     centres = terrain.vertices_m[terrain.faces, :2].mean(axis=1)
-    soil = plot_optics.ground_patches(centres, camera, **ground, seed=ground_seed)
+    soil = plot_optics.ground_patches(centres, camera, **ground, seed=stream_seed(seed, "ground"))
     n = len(reflectance)
     of_face = [
         of_leaf[leaves.element],
@@ -74,21 +71,31 @@ def _needles(
     grown: Sequence[Mesh],
     trees: pd.DataFrame,
     camera: Camera,
-    n_layers: int,
-    ratio: float,
-    water_cm: float,
+    crown: Mapping[str, Any],
+    rng: np.random.Generator,
 ) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-    """Optics (trees x layers, bands) of needles, and the row of every shoot of the plot."""
-    layer = [plot_optics.layers(mesh, n_layers) for mesh in grown]
-    factor = [
-        plot_optics.layer_factor(own, mesh.element_area_m2, n_layers, ratio)
-        for own, mesh in zip(layer, grown, strict=True)
+    """Optics (trees x parts, bands) of needles, and the row of every shoot of the plot."""
+    shape = crown["lcc_layers"], crown["leaves_per_layer"]
+    part = [
+        plot_optics.layers(mesh, shape[0]) * shape[1] + rng.integers(0, shape[1], mesh.n_elements)
+        for mesh in grown
     ]
-    lcc = np.concatenate([factor[tree.grown] * tree.lcc_ug_cm2 for tree in trees.itertuples()])
-    of_tree = np.repeat(np.arange(len(trees)), n_layers)
-    chemistry = {
+    lcc, dry_matter = [], []
+    for tree in trees.itertuples():
+        own = part[tree.grown], grown[tree.grown].element_area_m2
+        deviation = crown["within_tree_sd"] * np.clip(rng.standard_normal((2, *shape)), -2, 2)
+        ratio = crown["lowest_to_highest_lcc"]
+        lcc.append(tree.lcc_ug_cm2 * plot_optics.part_factor(*own, deviation[0], ratio))
+        factor = plot_optics.part_factor(*own, deviation[1], 1.0)
+        dry_matter.append(tree.dry_matter_g_cm2 * factor)
+    n_parts = shape[0] * shape[1]
+    of_tree = np.repeat(np.arange(len(trees)), n_parts)
+    others = {
         name: trees[name].to_numpy()[of_tree]
-        for name in ("structure_n", "dry_matter_g_cm2", "brown")
+        for name in ("structure_n", "brown", "chlorophyll_per_carotenoid", "water_cm")
     }
-    rows = [row * n_layers + layer[tree.grown] for row, tree in enumerate(trees.itertuples())]
-    return plot_optics.needles(lcc, camera, water_cm=water_cm, **chemistry), np.concatenate(rows)
+    optics = plot_optics.needles(
+        np.concatenate(lcc), camera, dry_matter_g_cm2=np.concatenate(dry_matter), **others
+    )
+    rows = [row * n_parts + part[tree.grown] for row, tree in enumerate(trees.itertuples())]
+    return optics, np.concatenate(rows)

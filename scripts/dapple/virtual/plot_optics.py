@@ -9,10 +9,14 @@ from scipy.stats import truncnorm
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
 from dapple.optics.bands import camera_mean
-from dapple.optics.cameras import Camera
-from dapple.optics.default_spectra import LITTER
+from dapple.optics.cameras import Band, Camera
+from dapple.optics.default_spectra import FOREST_SOIL, LITTER
 from dapple.optics.leaf import camera_leaves
-from dapple.optics.soil import two_soils
+
+WET_LOSS = 0.5
+"""Share of a dry soil's reflectance that it loses when saturated (Lobell and Asner 2002)."""
+BELL = np.linspace(-1.1, 1.1, 23)
+"""Where a band's response is told, in full widths at half its maximum."""
 
 
 @dataclass(frozen=True)
@@ -63,27 +67,29 @@ def layers(leaves: Mesh, n_layers: int) -> np.ndarray:
     return np.minimum((share * n_layers).astype(np.int32), n_layers - 1)
 
 
-def layer_factor(
-    layer: np.ndarray, area_m2: np.ndarray, n_layers: int, lowest_to_highest: float
+def part_factor(
+    part: np.ndarray, area_m2: np.ndarray, deviation: np.ndarray, lowest_to_highest: float
 ) -> np.ndarray:
-    """Chlorophyll of each layer (n_layers,) as a multiple of the tree's mean.
+    """Chlorophyll of each part of a crown as a multiple of the tree's mean.
 
     Parameters
     ----------
-    layer, area_m2 : (n_elements,)
-        Layer and area of every shoot.
-    n_layers : int
+    part, area_m2 : (n_elements,)
+        Part and area of every shoot. Parts are numbered layer by layer from below.
+    deviation : (n_layers, n_kinds) float64
+        Of the kinds of shoots within each layer, as a share of the layer's chlorophyll.
     lowest_to_highest : float
         Chlorophyll of the lowest over that of the highest layer; linear between.
 
     Returns
     -------
-    (n_layers,) float64
+    (n_layers * n_kinds,) float64
         Its mean over the leaf area is 1.
     """
-    height = np.arange(n_layers) / max(n_layers - 1, 1)
-    factor = lowest_to_highest + (1.0 - lowest_to_highest) * height
-    weight = np.bincount(layer, area_m2, n_layers)
+    height = np.arange(len(deviation)) / max(len(deviation) - 1, 1)
+    layer = lowest_to_highest + (1.0 - lowest_to_highest) * height
+    factor = (layer[:, None] * (1.0 + deviation)).ravel()
+    weight = np.bincount(part, area_m2, factor.size)
     return factor * weight.sum() / (factor * weight).sum()
 
 
@@ -94,20 +100,45 @@ def needles(
     structure_n: np.ndarray | float,
     dry_matter_g_cm2: np.ndarray | float,
     brown: np.ndarray | float,
-    water_cm: float,
-    carotenoids_per_chlorophyll: float = 0.25,
+    water_cm: np.ndarray | float,
+    chlorophyll_per_carotenoid: np.ndarray | float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Reflectance and transmittance (n, b) of needles with chlorophyll (n,), by PROSPECT-5."""
     return camera_leaves(
         camera,
         n=structure_n,
         chlorophyll_ug_cm2=lcc_ug_cm2,
-        carotenoids_ug_cm2=carotenoids_per_chlorophyll * np.asarray(lcc_ug_cm2),
+        carotenoids_ug_cm2=np.asarray(lcc_ug_cm2) / chlorophyll_per_carotenoid,
         brown=brown,
         water_cm=water_cm,
         dry_matter_g_cm2=dry_matter_g_cm2,
         prospect_version="5",
     )
+
+
+def as_built(nominal: Camera, *, centre_sd_nm: float, width_sd: float, seed: int) -> Camera:
+    """A camera as it left the factory: bell curves that lie a little beside the nominal windows.
+
+    Parameters
+    ----------
+    nominal : Camera
+        As its maker describes it; response curves that are told are moved and stretched.
+    centre_sd_nm, width_sd : float
+        Standard deviation of centres [nm], and of widths as a share; cut off at twice that.
+    seed : int
+    """
+    rng, bands = np.random.default_rng(seed), []
+    for band in nominal:
+        shift, stretch = np.clip(rng.standard_normal(2), -2, 2) * (centre_sd_nm, width_sd)
+        if band.response:
+            at_nm, response = np.array(band.response).T
+            at_nm = at_nm - band.centre_nm
+        else:
+            at_nm, response = BELL * band.width_nm, 0.5 ** (4 * BELL**2)
+        at_nm = band.centre_nm + shift + at_nm * (1.0 + stretch)
+        curve = tuple(zip(at_nm.tolist(), response.tolist(), strict=True))
+        bands.append(Band(band.name, band.centre_nm, band.width_nm, curve))
+    return Camera(tuple(bands))
 
 
 def in_bands(spectrum: Mapping[str, Sequence[float]], camera: Camera) -> np.ndarray:
@@ -129,8 +160,8 @@ def ground_patches(
 ) -> np.ndarray:
     """Reflectance (n, b) of the ground at places (n, 2), in patches.
 
-    Soil of `optics.soil.two_soils` mixes with litter of needles. Two smooth textures vary them:
-    one the moisture of the soil, one the share of litter.
+    A brown forest soil mixes with litter of needles. Two smooth textures vary them: one the
+    moisture of the soil, one the share of litter.
 
     Parameters
     ----------
@@ -138,7 +169,8 @@ def ground_patches(
         Places [m].
     camera : Camera
     brightness, moisture, litter_share : float
-        Means: of the soil's brightness and moisture, 0 to 1, and of the ground under litter.
+        A factor of the dry soil's reflectance, and means: of moisture as a share of saturation,
+        and of the ground under litter.
     variation : float
         Standard deviation of moisture and of litter share.
     patch_m : float
@@ -147,7 +179,8 @@ def ground_patches(
     """
     moist = np.clip(moisture + variation * _texture(centres_m, 2 * patch_m, seed), 0, 1)
     litter = np.clip(litter_share + variation * _texture(centres_m, patch_m, seed + 1), 0, 1)
-    soil = two_soils(camera)(np.full(len(moist), brightness), moist)
+    darker = brightness * (1.0 - WET_LOSS * moist[:, None])
+    soil = np.clip(darker * in_bands(FOREST_SOIL, camera), 0, 1)
     litter = litter[:, None]
     return (1 - litter) * soil + litter * in_bands(LITTER, camera)
 

@@ -52,9 +52,7 @@ def chemistry(
     n: int,
     *,
     lcc: Mapping[str, Any],
-    structure_n: tuple[float, float],
-    dry_matter_g_cm2: tuple[float, float],
-    brown: tuple[float, float],
+    others: Mapping[str, tuple[float, float]],
     seed: int,
 ) -> pd.DataFrame:
     """Chemistry of the needles of n trees.
@@ -64,17 +62,15 @@ def chemistry(
     n : int
     lcc : mapping
         Of `plot_optics.chlorophyll`.
-    structure_n, dry_matter_g_cm2, brown : (float, float)
-        Mean and standard deviation over trees.
+    others : mapping of str to (float, float)
+        Mean and standard deviation over trees of all but chlorophyll: `structure_n`, 1 or more,
+        `dry_matter_g_cm2`, `brown`, `chlorophyll_per_carotenoid`, `water_cm`.
     seed : int
     """
     columns = {"lcc_ug_cm2": plot_optics.chlorophyll(n, **lcc, seed=stream_seed(seed, "lcc"))}
     rng = np.random.default_rng(stream_seed(seed, "needles"))
-    for name, (mean, sd), least in (
-        ("structure_n", structure_n, 1.0),
-        ("dry_matter_g_cm2", dry_matter_g_cm2, 0.0),
-        ("brown", brown, 0.0),
-    ):
+    for name, (mean, sd) in others.items():
+        least = 1.0 if name == "structure_n" else 0.0
         columns[name] = np.maximum(mean + sd * np.clip(rng.standard_normal(n), -2, 2), least)
     return pd.DataFrame(columns)
 
