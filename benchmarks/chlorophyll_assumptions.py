@@ -49,7 +49,6 @@ def assumptions(species: str) -> dict[str, dict]:
 
     true = TRUE_SHOOTS[species]
     return {
-        "all priors": {},
         f"shoots as they are: {true:g}": shoots(true),
         "shoots as single leaves: 0": shoots(0.0),
         "shoots as in Scots pine: 0.47": shoots(0.47),

@@ -6,10 +6,9 @@
 `run` draws a world for every seed and species (its light, leaves, soils and chlorophyll), writes
 its configuration to FOLDER and runs the workflow up to the training sets; results go to
 `results/new-SPECIES-SEED`. Then it teaches ten networks of every kind on them and compares what
-they retrieve with the trees, into a table in FOLDER. `table` puts the tables together:
-docs/data/chlorophyll_plots.csv, a row for each plot, model, mask and kind of network;
-chlorophyll_summary.csv, the same over the plots of a species; and chlorophyll_costs.csv, what the
-steps of a plot cost.
+they retrieve with the trees, into a table in FOLDER. A plot whose table is there is left out.
+`table` puts the tables together: docs/data/chlorophyll_plots.csv, a row for each plot, model, mask
+and kind of network; and chlorophyll_costs.csv, what the steps of a plot cost.
 
 Plots are smaller than those of Zhao et al. (2025), with coarser images, fewer combinations and
 narrower networks, so that many plots and ten networks each can be run on two cores.
@@ -18,6 +17,7 @@ narrower networks, so that many plots and ten networks each can be run on two co
 import argparse
 import subprocess
 import sys
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +37,8 @@ ROOT = Path(__file__).parents[1]
 DATA = ROOT / "docs" / "data"
 SPECIES = ("larch", "spruce")
 MODELS = ("collision_orders", "semi_less", "prosail")
+TAUGHT = tuple(product(training_entries.MASKS, ("published", "robust")))
+"""Pixels and kind of network."""
 SEEDS = range(1, 11)
 """Of the networks."""
 PLOT = {"size_m": [15.0, 15.0], "pixel_m": 0.15, "field_trees": 8}
@@ -97,6 +99,8 @@ def make(folder: Path, seeds: list[int], cores: int) -> None:
         for species in SPECIES:
             config = configuration(species, seed)
             path = folder / f"{config['experiment']}.yaml"
+            if path.with_suffix(".csv").is_file():
+                continue
             path.write_text(yaml.safe_dump(config))
             retrieval = f"results/{config['experiment']}/plots/{species}/retrieval"
             targets = [f"{retrieval}/training_{model}_sunlit.parquet" for model in MODELS]
@@ -118,15 +122,13 @@ def score(settings: Settings, species: str, results: Path) -> list[dict]:
     """A row for each model, mask and kind of network of a plot."""
     retrieval, rows = results / "plots" / species / "retrieval", []
     for model in MODELS:
-        for mask in training_entries.MASKS:
+        for mask, kind in TAUGHT:
             frame = tables.read(retrieval / f"training_{model}_{mask}.parquet")
-            for kind in ("published", "robust"):
-                row = {"species": species, "plot_seed": settings.seed, "model": model}
-                row |= {"mask": mask, "network": kind}
-                robust = kind == "robust"
-                found = taught(frame, settings, robust=robust)
-                rows.append(row | field(*found, results / "plots" / species, mask))
-                print(rows[-1], flush=True)
+            row = {"species": species, "plot_seed": settings.seed, "model": model}
+            row |= {"mask": mask, "network": kind}
+            found = taught(frame, settings, robust=kind == "robust")
+            rows.append(row | field(*found, results / "plots" / species, mask))
+            print(rows[-1], flush=True)
     return rows
 
 
@@ -199,25 +201,6 @@ def field(
     }
 
 
-def summary(table: pd.DataFrame) -> pd.DataFrame:
-    """Over the plots of a species: all trees together, and the least and most of single plots."""
-    rows = []
-    for key, part in table.groupby(["species", "model", "mask", "network"], sort=False):
-        share = part["trees"] / part["trees"].sum()
-        mean = (part["truth_mean"] * share).sum()
-        variance = ((part["truth_sd"] ** 2 + (part["truth_mean"] - mean) ** 2) * share).sum()
-        rmse = np.sqrt((part["rmse"] ** 2 * share).sum())
-        row = dict(zip(("species", "model", "mask", "network"), key, strict=True))
-        row |= {"plots": len(part), "trees": part["trees"].sum(), "rmse": rmse}
-        row |= {"rmse_low": part["rmse"].min(), "rmse_high": part["rmse"].max()}
-        row |= {"bias": (part["bias"] * share).sum(), "r2": 1 - rmse**2 / variance}
-        row |= {"mean_guess_rmse": np.sqrt(variance)}
-        means = ("network_rmse_mean", "network_rmse_sd", "simulated_rmse")
-        row |= {name: part[name].mean() for name in means}
-        rows.append(row | {"coverage": (part["coverage"] * share).sum()})
-    return pd.DataFrame(rows)
-
-
 def costs(paths: list[Path]) -> pd.DataFrame:
     """Processor seconds and peak memory of every step, means over the plots of a species."""
     rows = []
@@ -244,10 +227,10 @@ def main() -> None:
     scored = sorted(given.folder.glob("new-*.csv"))
     table = pd.concat([pd.read_csv(path) for path in scored])
     plots = [path.with_suffix(".yaml") for path in scored]
-    made = {"plots": table, "summary": summary(table), "costs": costs(plots)}
+    made = {"plots": table, "costs": costs(plots)}
     for name, one in made.items():
         one.to_csv(DATA / f"chlorophyll_{name}.csv", index=False, float_format="%.5g")
-    print(made["summary"].round(2).to_string(index=False))
+    print(table.round(2).to_string(index=False))
 
 
 if __name__ == "__main__":
