@@ -171,3 +171,17 @@ def test_another_coordinate_system_is_refused(crowns):
     vectors.require_crs(crowns, "EPSG:25832", "crowns.geojson")
     with pytest.raises(InputError, match="crowns in EPSG:25832; expected EPSG:25833"):
         vectors.require_crs(crowns, "EPSG:25833", "crowns.geojson")
+
+
+def test_a_feature_that_gdal_cannot_parse_is_a_message(tmp_path):
+    path = tmp_path / "crowns.gml"
+    path.write_text(
+        '<ogr:FeatureCollection xmlns:ogr="http://ogr.maptools.org/" '
+        'xmlns:gml="http://www.opengis.net/gml/3.2"><ogr:featureMember><ogr:c gml:id="c.0">'
+        '<ogr:shape><gml:Polygon srsName="urn:ogc:def:crs:EPSG::25832" srsDimension="3">'
+        "<gml:exterior><gml:LinearRing><gml:posList>1 1 3 1</gml:posList></gml:LinearRing>"
+        "</gml:exterior></gml:Polygon></ogr:shape></ogr:c></ogr:featureMember>"
+        "</ogr:FeatureCollection>"
+    )
+    with pytest.raises(InputError, match=r"crowns\.gml"):
+        vectors.read(path)

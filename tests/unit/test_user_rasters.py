@@ -274,3 +274,11 @@ def test_systems_that_are_not_in_true_metres_are_brought_into_them(tmp_path, crs
     read = user_rasters.read(path, CAMERA)
     assert read.raster.crs.startswith("EPSG:326")
     assert read.raster.pixel_m == pytest.approx(pixel_m, rel=0.02)
+
+
+def test_bands_without_names_whose_red_edge_outshines_the_infrared_are_in_another_order(tmp_path):
+    path = tiff(tmp_path / "a.tif", leaves()[[0, 1, 2, 4, 3]].astype("float32"), names=None)
+    with pytest.raises(InputError, match=r"`band_order` of the plot; \[1, 2, 3, 5, 4\] fits"):
+        user_rasters.read(path, CAMERA)
+    read = user_rasters.read(path, CAMERA, band_order=(1, 2, 3, 5, 4))
+    np.testing.assert_allclose(medians(read), USUAL, rtol=0.05)

@@ -25,6 +25,8 @@ WORDS = {
 WAVELENGTH_TAGS = ("wavelength", "central_wavelength", "centralwavelength", "center_wavelength",
                    "wavelength_nm", "centre_wavelength")  # fmt: skip
 LEAST_TOLERANCE_NM = 10.0
+BY_ORDER = "by order, for they have no names"
+"""How bands were found that only their order tells."""
 
 
 class CameraBand(Protocol):
@@ -102,7 +104,7 @@ def match(
         if any(value is not None for value in kind):
             return [_of(band, camera, kind, descriptions, where, hint) for band in camera], how
     if len(descriptions) == len(camera) and not any(map(_is_named, descriptions)):
-        return list(range(len(camera))), "by order, for they have no names"
+        return list(range(len(camera))), BY_ORDER
     raise InputError(
         where,
         f"bands {', '.join(text or '(no name)' for text in descriptions)}",

@@ -8,7 +8,7 @@ import numpy as np
 from dapple import findings
 from dapple.errors import InputError
 from dapple.findings import Finding
-from dapple.formats.raster_bands import CameraBand
+from dapple.formats.raster_bands import COLOURS_NM, CameraBand
 
 SCALES = {
     32_768.0: "MicaSense, Metashape",
@@ -122,3 +122,37 @@ def check(path: Path, values: np.ndarray, camera: Sequence[CameraBand]) -> list[
             "Check `scale` of the plot.",
         )
     ]
+
+
+def check_order(path: Path, values: np.ndarray, camera: Sequence[CameraBand]) -> None:
+    """Raise an InputError where bands that only their order tells cannot be in it.
+
+    Leaves reflect more of the near infrared than of the red edge. Cameras of MicaSense number the
+    red edge last, behind the near infrared.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    values : (b, rows, columns) float64
+        Reflectance, NaN without data.
+    camera : sequence of bands
+        In the order in which the image's bands were taken.
+    """
+    middles = np.nanmedian(values, axis=(1, 2))
+    edge, infrared = (
+        [k for k, band in enumerate(camera) if low <= band.centre_nm < high]
+        for low, high in (COLOURS_NM["rededge"], COLOURS_NM["nir"])
+    )
+    for k in edge:
+        for other in infrared:
+            if middles[k] > middles[other]:
+                order = list(range(1, len(camera) + 1))
+                order[k], order[other] = order[other], order[k]
+                raise InputError(
+                    path,
+                    f"{middles[k]:.3g} at {camera[k].centre_nm:g} nm and {middles[other]:.3g} at "
+                    f"{camera[other].centre_nm:g} nm, by the order of bands without names",
+                    "more of the near infrared than of the red edge from leaves",
+                    f"Set `band_order` of the plot; {order} fits.",
+                )

@@ -111,7 +111,7 @@ def read(
         ) from error
     kind = np.dtype(file.dtypes[chosen[0] - 1])
     values, gone = _without_data(values, valid, empty, np.iinfo(kind).max if is_integer else None)
-    if how == "by order, for they have no names":
+    if how == raster_bands.BY_ORDER:
         noticed.append(
             findings.warning(
                 path,
@@ -127,6 +127,8 @@ def read(
     ]
     values, factor = raster_scale.reflectance(path, values, scale, scales, offsets, is_integer)
     noticed += raster_scale.check(path, values, camera)
+    if how == raster_bands.BY_ORDER:
+        raster_scale.check_order(path, values, camera)
     names = tuple(band.name for band in camera)
     raster = Raster(
         values.astype(np.float32), transform.c, transform.f, float(transform.a), target, names

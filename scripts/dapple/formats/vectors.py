@@ -21,6 +21,7 @@ from dapple.formats.table_numbers import parse
 TREE_NAMES = ("tree", "tree_id", "id", "name", "label")
 LCC_NAMES = ("lcc_ug_cm2", "lcc", "chlorophyll", "chl")
 LARGEST_LCC_UG_CM2 = 200.0
+GDAL_ERRORS = (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError)
 SIDECARS = (".dbf", ".shx")
 
 
@@ -202,7 +203,7 @@ def _open(path: Path, layer: str) -> geopandas.GeoDataFrame:
             # judged here.
             warnings.simplefilter("ignore", RuntimeWarning)
             found = pyogrio.read_dataframe(path, layer=layer or None, on_invalid="fix")
-    except (pyogrio.errors.DataSourceError, shapely.errors.GEOSException, ValueError) as error:
+    except (*GDAL_ERRORS, shapely.errors.GEOSException, ValueError) as error:
         raise InputError(
             path,
             f"nothing that GDAL reads ({error})",
