@@ -37,9 +37,15 @@ include: "rules/stability/runs.smk"
 include: "rules/stability/map.smk"
 include: "rules/stability/records.smk"
 include: "rules/provenance.smk"
+include: "rules/estimate.smk"
 
 
 rule all:
     default_target: True
     input:
         targets(),
+
+
+onstart:
+    if workflow.is_main_process and (said_first := forewarning(workflow.dag)):
+        logger.info(said_first)

@@ -17,6 +17,9 @@ from dapple.clock import time_range
 from dapple.cloud.classifiers import CLASSIFIERS
 from dapple.config.settings import validate
 from dapple.errors import InputError
+from dapple.estimate.beginning import Known, configuration_before, tell
+from dapple.estimate.planned import edited, planned, total
+from dapple.estimate.sizes import sizes
 from dapple.optics import responses
 from dapple.streams import stream_seed
 from dapple.structure.voxel_sizes import finer_than
@@ -30,7 +33,13 @@ except InputError as error:
     sys.exit(f"dapple: {error}")
 
 N_TIMES = len(time_range(**dict(settings.time)))
-PLACEMENTS = range(settings.leaves.placements if settings.source == "wood" else 1)
+# Leaves that come with real wood, where the user has them.
+REAL_LEAVES = bool(settings.leaves.path) and (
+    (Path(settings.data_dir) / settings.leaves.path).is_file()
+)
+PLACEMENTS = range(
+    settings.leaves.placements if settings.source == "wood" and not REAL_LEAVES else 1
+)
 VOXELS = [name for name in settings.reconstructions if name.startswith("voxels_")]
 # Those whose signals of trust are known.
 JUDGED = [
@@ -141,9 +150,13 @@ def data(path):
     """A file of real data, which the configuration names relative to data_dir."""
     file = Path(settings.data_dir) / path
     if not file.is_file():
+        published = (
+            "`tools/apple-data CLONE` lays them out from a clone of JulFrey/dotshadow. "
+        )
         sys.exit(
             f"dapple: {file}: found no such file; expected the data that `{settings.experiment}` "
-            "reads. Set data_dir in the configuration to the folder that has it."
+            f"reads. {published if path.startswith('apple/') else ''}"
+            "Set data_dir in the configuration to the folder that has it."
         )
     DATA_FILES.append(local(str(file)))
     return DATA_FILES[-1]
@@ -353,3 +366,28 @@ def without_shots(wildcards):
         "Points alone do not tell what a scanner saw through: see docs/input.md for how shots "
         "come with a cloud."
     )
+
+
+def known_before():
+    """Sizes of this run and of the one before it, and what was edited between."""
+    old = configuration_before(Path(results("")))
+    try:
+        earlier = sizes(validate(old)) if old else None
+    except InputError:  # written by another version
+        earlier = None
+    now = settings.model_dump(mode="json")
+    return {
+        "now": sizes(settings),
+        "earlier": earlier,
+        "edits": tuple(edited(old, now)) if old else None,
+    }
+
+
+def forewarning(dag):
+    """What a run is going to do, and why."""
+    jobs = planned(dag)
+    names = [job.rule for job in jobs]
+    if "estimate" in names or "check" in names:
+        return ""
+    known = Known(Path(results("")), workflow.cores or 1, **known_before())
+    return tell(jobs, total(dag), known)

@@ -1,0 +1,81 @@
+"""What a run will do, in a sentence and in a table."""
+
+from collections.abc import Sequence
+
+from dapple.estimate.forecast import Forecast
+from dapple.estimate.planned import ASKED, INTERRUPTED, MISSING, Job
+
+MOST_CAUSES = 3
+
+
+def duration(seconds: float) -> str:
+    """A duration as people say it: 40 s, 3 min, 2 h 10 min."""
+    if seconds < 90:
+        return f"{max(seconds, 1):.0f} s"
+    minutes = round(seconds / 60)
+    if minutes < 90:
+        return f"{minutes} min"
+    return f"{minutes // 60} h {minutes % 60:02d} min"
+
+
+def sentence(
+    jobs: Sequence[Job], total: int, seconds: float | None, edits: Sequence[str], is_first: bool
+) -> str:
+    """How many steps will run, for how long, and why.
+
+    Parameters
+    ----------
+    jobs : sequence of Job
+        That are to run.
+    total : int
+        Jobs that the run has in all.
+    seconds : float or None
+        None where nothing is known of this machine.
+    edits : sequence of str
+        What was changed in the configuration since the last run.
+    is_first : bool
+        Whether nothing of this run has been made yet.
+    """
+    if not jobs:
+        return "Nothing to do: all results are there, and nothing that they depend on has changed."
+    steps = f"{len(jobs)} of {total} steps" if len(jobs) < total else f"{total} steps"
+    steps = "1 step" if total == 1 else steps
+    about = "" if seconds is None else f", about {duration(seconds)}"
+    if is_first:
+        return f"{steps}{about}: nothing of this run has been made yet."
+    return f"{steps}{about}, because {_listed(causes(jobs, edits))}."
+
+
+def causes(jobs: Sequence[Job], edits: Sequence[str]) -> list[str]:
+    """Why jobs run: edits of the configuration and of files first."""
+    found = list(dict.fromkeys(cause for job in jobs for cause in job.causes))
+    files = [cause for cause in found if cause not in (MISSING, INTERRUPTED, ASKED)]
+    said = [*edits, *(f"{file} changed" for file in files)]
+    said += [cause for cause in (ASKED, INTERRUPTED) if cause in found]
+    if MISSING in found and not said:
+        said.append(MISSING)
+    return said or ["a rule or its settings changed"]
+
+
+def table(forecast: Forecast, cores: int) -> str:
+    """The forecast, a line for each step, and what it adds up to."""
+    lines = [f"{'step':24}{'jobs':>6}{'time':>12}{'memory':>10}"]
+    lines += [
+        f"{rule:24}{jobs:6d}{duration(seconds):>12}{megabytes / 1000:7.1f} GB"
+        for rule, jobs, seconds, megabytes in forecast.rows
+    ]
+    plural = "cores" if cores > 1 else "core"
+    lines.append(
+        f"In all about {duration(forecast.seconds)} on {cores} {plural}, "
+        f"and up to {forecast.peak_mb / 1000:.1f} GB of memory."
+    )
+    if forecast.unknown:
+        lines.append(f"Not counted, because never measured: {', '.join(sorted(forecast.unknown))}.")
+    return "\n".join(lines)
+
+
+def _listed(parts: Sequence[str]) -> str:
+    shown = list(parts[:MOST_CAUSES])
+    if len(parts) > MOST_CAUSES:
+        shown.append(f"{len(parts) - MOST_CAUSES} more")
+    return shown[0] if len(shown) == 1 else f"{', '.join(shown[:-1])} and {shown[-1]}"
