@@ -83,28 +83,52 @@ if settings.source == "wood":
         script:
             "../scripts/real_wood.py"
 
-    rule virtual_leaves:
-        input:
-            wood=results("structure/polygons/wood.ply"),
-            code=code("virtual_leaves"),
-        output:
-            leaves=results("structure/polygons/leaves_{placement}.ply"),
-        log:
-            logs("virtual_leaves_{placement}"),
-        benchmark:
-            benchmarks("virtual_leaves_{placement}")
-        conda:
-            "../envs/dapple.yaml"
-        threads: 1
-        resources:
-            mem_mb=memory(2000),
-        params:
-            **settings.leaves.model_dump(exclude={"placements"}),
-            seed=lambda wildcards: stream("virtual_leaves", wildcards.placement),
-        message:
-            said("leaves along the real wood, placement {wildcards.placement}")
-        script:
-            "../scripts/virtual_leaves.py"
+    if REAL_LEAVES:
+
+        rule real_leaves:
+            input:
+                obj=data(settings.leaves.path),
+                code=code("real_wood"),
+            output:
+                leaves=results("structure/polygons/leaves_0.ply"),
+            log:
+                logs("real_leaves"),
+            benchmark:
+                benchmarks("real_leaves")
+            conda:
+                "../envs/dapple.yaml"
+            threads: 1
+            resources:
+                mem_mb=memory(4000),
+            message:
+                said("leaf polygons of {input.obj}")
+            script:
+                "../scripts/real_wood.py"
+
+    else:
+
+        rule virtual_leaves:
+            input:
+                wood=results("structure/polygons/wood.ply"),
+                code=code("virtual_leaves"),
+            output:
+                leaves=results("structure/polygons/leaves_{placement}.ply"),
+            log:
+                logs("virtual_leaves_{placement}"),
+            benchmark:
+                benchmarks("virtual_leaves_{placement}")
+            conda:
+                "../envs/dapple.yaml"
+            threads: 1
+            resources:
+                mem_mb=memory(2000),
+            params:
+                **settings.leaves.model_dump(exclude={"placements", "path"}),
+                seed=lambda wildcards: stream("virtual_leaves", wildcards.placement),
+            message:
+                said("leaves along the real wood, placement {wildcards.placement}")
+            script:
+                "../scripts/virtual_leaves.py"
 
     rule virtual_leaves_summary:
         input:

@@ -1,13 +1,13 @@
-"""Read real wood polygons (OBJ in LESS axes) into the local frame."""
+"""Read real polygons (OBJ in LESS axes), of wood or of leaves, into the local frame."""
 
 from dapple.formats import meshes
 from dapple.workflow import run
 
 
 def main(snakemake):
-    wood = meshes.read_obj(snakemake.input.obj, axes="less")
-    print(f"{wood.n_elements} polygons, {wood.area_m2:.2f} m²")
-    meshes.write_ply(snakemake.output.wood, wood)
+    mesh = meshes.without_backs(meshes.read_obj(snakemake.input.obj, axes="less"))
+    print(f"{mesh.n_elements} polygons, {mesh.area_m2:.2f} m²")
+    meshes.write_ply(snakemake.output[0], mesh)
 
 
 if __name__ == "__main__":

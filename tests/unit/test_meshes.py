@@ -150,3 +150,14 @@ def test_elements_know_their_tilt():
         [Mesh(m.vertices_m, m.faces, np.array(m.element)) for m in (upright, flat)]
     )
     assert both.tilt_deg == pytest.approx([90, 0])
+
+
+def test_polygons_that_are_there_from_both_sides_count_once(tmp_path):
+    (tmp_path / "leaves.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 5\n"
+        "f 1 2 3 4\nf 4 3 2 1\nf 1 2 5\nf 5 2 1\nf 2 3 5\n"
+    )
+    mesh = meshes.without_backs(meshes.read_obj(tmp_path / "leaves.obj", axes="local"))
+    assert mesh.n_elements == 3
+    assert mesh.element.tolist() == [0, 0, 1, 2]
+    assert mesh.area_m2 == pytest.approx(1.0 + 2.5 + 0.5 * np.sqrt(26), rel=1e-6)

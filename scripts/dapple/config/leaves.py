@@ -8,6 +8,10 @@ from dapple.config.base import FREY, Count, LeafAngles, NotNegative, Positive, S
 class Leaves(Section):
     """Virtual leaf polygons along real wood (`source: wood`)."""
 
+    path: str = key(
+        "",
+        "OBJ of real leaves in LESS axes, relative to data_dir; taken instead where it is there",
+    )
     placements: Count = key(8, "independent placements; light is their mean")
     leaf_area_m2: Positive = key(187.0, "area of all leaf polygons", FREY)
     n_elements: Count = key(147_098, "leaf polygons, one in a 5 cm voxel", FREY)

@@ -174,6 +174,17 @@ def write_obj(path: str | Path, mesh: Mesh, axes: str) -> None:
     obj.write(path, vertices, polygons_of(mesh), axes)
 
 
+def without_backs(mesh: Mesh) -> Mesh:
+    """Each element once, where it comes a second time, turned round to be seen from behind."""
+    starts = np.flatnonzero(np.diff(mesh.element, prepend=-1))
+    first: dict[tuple[int, ...], int] = {}
+    for number, faces in enumerate(np.split(mesh.faces, starts[1:])):
+        first.setdefault(tuple(np.unique(faces)), number)
+    kept = np.isin(mesh.element, list(first.values()))
+    _, element = np.unique(mesh.element[kept], return_inverse=True)
+    return Mesh(mesh.vertices_m, mesh.faces[kept], element.astype(np.int32))
+
+
 def read_obj(path: str | Path, axes: str) -> Mesh:
     """Read Wavefront OBJ; each face becomes an element, cut into triangles from its first vertex.
 
