@@ -13,6 +13,9 @@ from rasterio.transform import Affine
 from dapple.errors import InputError
 from dapple.formats.atomic import atomic
 
+MOST_VALUES = 1_000_000_000
+"""More values of all bands are not read: they would take 8 GB."""
+
 
 @dataclass(frozen=True)
 class Raster:
@@ -74,14 +77,15 @@ def read(path: str | Path) -> Raster:
     Raises
     ------
     InputError
-        No such file, no raster, no coordinate system or one in degrees, pixels that are not
-        square or do not run east and south.
+        No such file, no raster, more pixels than fit into memory, no coordinate system or one in
+        degrees, pixels that are not square or do not run east and south.
     """
     path = Path(path)
     if not path.is_file():
         raise InputError(path, "no file", "a raster", "Check the path in the configuration.")
     try:
         with rasterio.open(path) as file:
+            _check_size(path, file.width, file.height, file.count)
             crs = _crs(path, file.crs)
             transform, pixel_m = file.transform, _pixel(path, file.transform)
             masked = file.read(masked=True, out_dtype=np.float64)
@@ -219,6 +223,16 @@ def require_overlap(
             "Give data of one place in one coordinate system.",
         )
     return share
+
+
+def _check_size(path: Path, width: int, height: int, bands: int) -> None:
+    if width * height * bands > MOST_VALUES:
+        raise InputError(
+            path,
+            f"{width} x {height} pixels in {bands} bands",
+            f"at most {MOST_VALUES:,} values",
+            "Cut out what belongs to the plot (gdalwarp -te), or make its pixels larger (-tr).",
+        )
 
 
 def _crs(path: Path, crs) -> str:
