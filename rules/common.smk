@@ -45,7 +45,7 @@ VOXELS = [name for name in settings.reconstructions if name.startswith("voxels_"
 JUDGED = [
     name
     for name in settings.reconstructions
-    if name == "polygons" or name.startswith("voxels_")
+    if name in ("polygons", "surfels") or name.startswith("voxels_")
 ]
 LIT = settings.reconstructions if settings.sensors.kind != "none" else ()
 VARIANT = f"{settings.light.variant}_ad"

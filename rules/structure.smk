@@ -203,6 +203,8 @@ rule voxels_summary:
         code=code("voxels_summary"),
     output:
         summary=results("structure/voxels_{size}/summary.json"),
+        plant_area=results("structure/voxels_{size}/plant_area.csv"),
+        intervals=results("structure/voxels_{size}/plant_area.nc"),
     log:
         logs("summary_voxels_{size}"),
     benchmark:
@@ -212,7 +214,11 @@ rule voxels_summary:
     threads: 1
     resources:
         mem_mb=memory(1000),
+    params:
+        element_area_m2=settings.voxels.single_leaf_area_m2
+        or settings.polygons.leaf_size_m**2,
+        fill_range_m=settings.corrections.fill_range_m,
     message:
-        said("areas in {wildcards.size} m voxels")
+        said("areas in {wildcards.size} m voxels, and how sure they are")
     script:
         "../scripts/voxels_summary.py"

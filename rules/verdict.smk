@@ -6,16 +6,19 @@ Needs   classes/cloud.laz; scan/shots.parquet, structure/, light/, sky/ and stat
 Makes   verdict.json      green, amber or red for every reconstruction, with reasons and remedies
 """
 
+# Polygons are made with the wood of surfels anyway.
+MESHED = {"polygons", "surfels"} & set(JUDGED)
+
 
 rule verdict:
     input:
         cloud=results("classes/cloud.laz"),
         shots=(results("scan/shots.parquet") if settings.has_shots else []),
-        leaves=leaf_meshes("polygons") if "polygons" in JUDGED else [],
-        wood=(
-            results("structure/polygons/wood.ply")
-            if LIT or "polygons" in JUDGED
-            else []
+        leaves=leaf_meshes("polygons") if MESHED else [],
+        wood=(results("structure/polygons/wood.ply") if LIT or MESHED else []),
+        surfels=leaf_meshes("surfels") if "surfels" in JUDGED else [],
+        surfel_facts=(
+            results("structure/surfels/summary.json") if "surfels" in JUDGED else []
         ),
         voxels=[
             results(f"structure/{name}/voxels.nc")
@@ -48,6 +51,10 @@ rule verdict:
             if settings.source != "wood"
             else None
         ),
+        beam={
+            "exit_aperture_m": settings.surfels.beam_diameter_m,
+            "beam_divergence_mrad": settings.surfels.beam_divergence_mrad,
+        },
         ground_z_m=GROUND_Z_M,
         variant=f"{VARIANT}_mono",
         sun_diameter_deg=settings.light.sun_diameter_deg,

@@ -68,7 +68,8 @@ def loaded(name, inputs, params):
     """The scenes of a reconstruction as rays meet them."""
     around = scene_files.around(inputs.ground or params.ground_z_m, inputs.shade)
     grid = [path for path in inputs.voxels if Path(path).parent.name == name]
-    scenes = scene_files.read(grid or inputs.leaves, inputs.wood, around)
+    leaves = inputs.surfels if name == "surfels" else grid or inputs.leaves
+    scenes = scene_files.read(leaves, inputs.wood, around)
     return [traced.load(scene, params.variant) for scene in scenes]
 
 

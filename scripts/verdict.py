@@ -38,6 +38,9 @@ def scanned(inputs, params):
         leaves=leaves,
         wood=meshes.read_ply(inputs.wood) if inputs.wood else meshes.empty(),
         points_per_polygon=points_per_polygon(cloud, leaves, size_m) if size_m else None,
+        surfels=meshes.read_ply(inputs.surfels[0]) if inputs.surfels else None,
+        surfel_facts=json.read(inputs.surfel_facts) if inputs.surfel_facts else {},
+        beam=params.beam,
         voxels={
             Path(path).parent.name: as_estimated(voxel_grids.read(path)) for path in inputs.voxels
         },
@@ -51,7 +54,8 @@ def lighted(found, inputs, params):
 
     def scenes_of(name):
         grid = [path for path in inputs.voxels if Path(path).parent.name == name]
-        scenes = scene_files.read(grid or inputs.leaves, inputs.wood, around)
+        leaves = inputs.surfels if name == "surfels" else grid or inputs.leaves
+        scenes = scene_files.read(leaves, inputs.wood, around)
         return (traced.load(scene, params.variant) for scene in scenes)
 
     return with_light(

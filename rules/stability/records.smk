@@ -12,6 +12,7 @@ if WORSENED:
             records=results("statistics/records.csv"),
             light=[results(f"light/{name}.nc") for name in WORSENED],
             leaves=leaf_meshes("polygons") if "polygons" in WORSENED else [],
+            surfels=leaf_meshes("surfels") if "surfels" in WORSENED else [],
             wood=results("structure/polygons/wood.ply"),
             voxels=[
                 results(f"structure/{name}/voxels.nc")

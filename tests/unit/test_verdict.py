@@ -106,6 +106,14 @@ def test_only_what_is_worse_than_usual_is_suspicious():
     assert departure("unknown_share", [math.nan], learned) == [0]
 
 
+def test_a_signal_of_surfels_judges_no_other_reconstruction():
+    runs = stress(USUAL | {"sparse": "surfels_without_surface"})
+    runs.loc[runs["reconstruction"] == "polygons", "reconstruction"] = "surfels"
+    models = fitting.fit(runs)
+    assert "surfels_without_surface" in models["surfels"]["signals"]
+    assert "surfels_without_surface" not in models["voxels_1.0"]["signals"]
+
+
 def test_no_weight_calls_off_an_alarm():
     models = fitting.fit(stress(USUAL))
     for model in models.values():

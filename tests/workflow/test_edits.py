@@ -85,7 +85,7 @@ CODE = {
     "structure/polygons.py": f"{POLYGONS} {traced(4)}",
     "structure/surfels.py": f"surfels {traced(1)}",
     "structure/voxels.py": f"voxels*2 voxels_summary*2 {traced(2)}",
-    "structure/occlusion.py": "verdict",  # the correction is turned off
+    "structure/occlusion.py": "voxels_summary*2 verdict",  # the correction is turned off
     "sky/sun.py": f"sky {SKY}",
     "sky/models/perez.py": f"sky {SKY}",
     "scene/sensors.py": f"sensors tree_figure {traced(5)}",

@@ -151,13 +151,13 @@ class Chain:
         """Edge of the voxels that polygons are made in [m]."""
         return self.setup.polygons["voxel_size_m"] * conditions.voxel_factor
 
-    def surfels(self, conditions: Conditions) -> Mesh:
-        """Leaves as discs on local surfaces."""
+    def surfels(self, conditions: Conditions) -> tuple[Mesh, dict[str, Any]]:
+        """Leaves as discs on local surfaces, and what was found on the way."""
 
-        def make() -> Mesh:
+        def make() -> tuple[Mesh, dict[str, Any]]:
             seed = stream_seed(self.seed, "surfels")
             cloud, shots = self.classes(conditions), self.shots(conditions)
-            return steps.surfels(cloud, shots, seed=seed, **self.setup.surfels)[0]
+            return steps.surfels(cloud, shots, seed=seed, **self.setup.surfels)
 
         return self._step("surfels", conditions, make)
 

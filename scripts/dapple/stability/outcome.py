@@ -161,6 +161,9 @@ def run_data(
     meshes = _tried(lambda: chain.polygons(conditions))
     if isinstance(meshes, InputError):
         meshes = {"leaf": empty(), "wood": empty()}
+    surfels = None, {}
+    if "surfels" in light:
+        surfels = chain.surfels(conditions)
     voxels = {
         name_of(size_m): _tried(lambda m=size_m: chain.voxels(conditions, m))
         for size_m in chain.setup.sizes_m
@@ -173,6 +176,12 @@ def run_data(
         points_per_polygon=points_per_polygon(
             cloud, meshes["leaf"], chain.polygon_size_m(conditions)
         ),
+        surfels=surfels[0],
+        surfel_facts=surfels[1],
+        beam={
+            "exit_aperture_m": chain.setup.surfels["beam_diameter_m"],
+            "beam_divergence_mrad": chain.setup.surfels["beam_divergence_mrad"],
+        },
         voxels={n: grid for n, grid in voxels.items() if not isinstance(grid, InputError)},
     )
     # Records and light are stamped by the clock that is believed.

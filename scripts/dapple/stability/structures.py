@@ -53,7 +53,7 @@ def make(chain: Chain, name: str, conditions: Conditions) -> Structure:
             return _polygons(chain, conditions, bool(corrected))
         case ["surfels"]:
             meshes = {
-                "leaf": chain.surfels(conditions),
+                "leaf": chain.surfels(conditions)[0],
                 "wood": chain.polygons(conditions)["wood"],
             }
             return _one(chain, meshes, meshes["leaf"].area_m2)

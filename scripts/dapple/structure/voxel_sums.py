@@ -67,7 +67,7 @@ class Sums:
         Longest optical path in a voxel [m].
     max_pad_m2_m3 : float
         Cap of plant area density.
-    n_shots, n_misses : int
+    n_shots, n_misses, n_scans : int
     world_origin_m : (3,) float64
         World coordinates of the local origin [m].
     settings : dict
@@ -83,6 +83,7 @@ class Sums:
     max_pad_m2_m3: float
     n_shots: int
     n_misses: int
+    n_scans: int
     world_origin_m: np.ndarray
     settings: dict
 
@@ -161,6 +162,7 @@ def accumulate(
     touched, hit = np.zeros((2, grid.n_voxels, n_parts**3), np.uint8)
     beam = np.array([math.tan(beam_divergence_mrad / 2000), beam_diameter_m])
     n_shots = n_misses = n_returns = 0
+    scans: set[int] = set()
     world_origin_m = np.zeros(3)
     for chunk in [chunks] if isinstance(chunks, Shots) else chunks:
         returns.check_chunk(chunk)
@@ -187,6 +189,7 @@ def accumulate(
             hit,
         )
         n_shots += len(chunk)
+        scans.update(np.unique(chunk.scan).tolist())
         n_misses += int(np.count_nonzero(chunk.n_returns == 0))
         n_returns += len(chunk.range_m)
         world_origin_m = np.asarray(chunk.world_origin_m, np.float64)
@@ -212,6 +215,7 @@ def accumulate(
         max_pad_m2_m3,
         n_shots,
         n_misses,
+        len(scans),
         world_origin_m,
         settings,
     )

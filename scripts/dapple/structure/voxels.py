@@ -147,6 +147,7 @@ def _dataset(sums: Sums, variables: dict, estimator: str, min_shots: int) -> xr.
         "min_shots": min_shots,
         "total_shots": sums.n_shots,
         "total_misses": sums.n_misses,
+        "total_scans": sums.n_scans,
         **sums.settings,
     }
     return dataset

@@ -120,8 +120,9 @@ def fit(
     models = {}
     for name, rows in runs[runs["ran"]].groupby("reconstruction"):
         if (~rows["is_failure"]).sum() >= MIN_RUNS:
+            own = [signal for signal in names if SIGNALS[signal].only_of in ("", name)]
             models[str(name)] = _fit_one(
-                rows, undisturbed, names, penalty, most_false_alarms, least_loss
+                rows, undisturbed, own, penalty, most_false_alarms, least_loss
             )
     return models
 
@@ -279,9 +280,9 @@ def validate(
     halves = cross_flagged(runs, seed=seed, **everywhere)
     found: dict[str, Any] = {
         "halves": rates(runs, halves),
-        "unseen_stressor": rates(runs, _left_out_flagged(runs, "stressor", **everywhere)),
+        "unseen_stressor": rates(runs, unseen_flagged(runs, "stressor", **everywhere)),
         # What is usual is told by the other worlds, too: a user's tree is not among them.
-        "unseen_world": rates(runs, _left_out_flagged(runs, "seed", **settings)),
+        "unseen_world": rates(runs, unseen_flagged(runs, "seed", **settings)),
     }
     for column in ("reconstruction", "stressor"):
         found[f"by_{column}"] = {
@@ -290,8 +291,9 @@ def validate(
     return found
 
 
-def _left_out_flagged(runs: pd.DataFrame, column: str, **settings: Any) -> np.ndarray:
+def unseen_flagged(runs: pd.DataFrame, column: str, **settings: Any) -> np.ndarray:
     """(n,) bool: runs of each value of a column, judged by models fitted to all other runs."""
+    runs = runs if "is_failure" in runs else _marked(runs)
     alarm = np.zeros(len(runs), bool)
     for value in runs[column].unique():
         own = (runs[column] == value).to_numpy()

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -31,6 +32,12 @@ class RunData:
         Polygons; empty meshes where there are none.
     points_per_polygon : (n_elements,) int or None
         Leaf points that each leaf polygon was made of.
+    surfels : Mesh or None
+        Discs in the leaves' place.
+    surfel_facts : dict
+        What was found when they were made (`structure.surfels.reconstruct`).
+    beam : dict of str to float
+        Of the scanner, fields of `scanner_model.Scanner`; empty: its defaults.
     voxels : dict of str to Dataset
         By reconstruction, as in `voxels_0.2`.
     light, moved_light : dict of str to Dataset
@@ -48,6 +55,9 @@ class RunData:
     leaves: Mesh
     wood: Mesh
     points_per_polygon: np.ndarray | None = None
+    surfels: Mesh | None = None
+    surfel_facts: dict[str, Any] = field(default_factory=dict)
+    beam: dict[str, float] = field(default_factory=dict)
     voxels: dict[str, xr.Dataset] = field(default_factory=dict)
     light: dict[str, xr.Dataset] = field(default_factory=dict)
     moved_light: dict[str, xr.Dataset] = field(default_factory=dict)

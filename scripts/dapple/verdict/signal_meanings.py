@@ -19,12 +19,15 @@ class Signal:
         What would help.
     is_log : bool
         Judged by its logarithm.
+    only_of : str
+        The reconstruction that alone is judged by it: others may come without that one.
     """
 
     worse: int
     text: str
     help: str
     is_log: bool = False
+    only_of: str = ""
 
     def tell(self, value: float) -> str:
         """What a value of the signal says, in words."""
@@ -57,6 +60,11 @@ DISAGREEMENT = (
     "Compare both reconstructions in a part of the crown that is seen well; where they differ, at "
     "least one is wrong."
 )
+REFIT = (
+    "See where in structure/RECONSTRUCTION/rescan.csv (`snakemake -- rescan`); take another size, "
+    "or the reconstruction that the shots fit."
+)
+OPENNESS = "the scan's own shots pass {} with an error of {{value:.0%}}, degree by degree"
 
 SIGNALS = {
     "scan_count": Signal(-1, "{value:.0f} scan positions", MORE_SCANS, is_log=True),
@@ -119,6 +127,22 @@ SIGNALS = {
     "plant_area_index": Signal(1, "a dense crown: {value:.1f} m² of leaf above each m²", OCCLUDED),
     "fine_voxel_to_crown": Signal(1, "small voxels of {value:.2f} of the crown's size", FINER),
     "coarse_voxel_to_crown": Signal(1, "large voxels of {value:.2f} of the crown's size", FINER),
+    "shots_per_surfel": Signal(
+        -1, "{value:.1f} shots tell how open a disc is", DENSER, is_log=True, only_of="surfels"
+    ),
+    "surfels_without_surface": Signal(
+        1, "{value:.0%} of the discs lie on no surface that points show", DENSER, only_of="surfels"
+    ),
+    "area_surfels_to_fine": Signal(
+        0,
+        "surfels have {factor:.2f} times the leaf area of the voxels",
+        DISAGREEMENT,
+        only_of="surfels",
+    ),
+    "gap_error_polygons": Signal(1, OPENNESS.format("polygons"), REFIT),
+    "gap_error_surfels": Signal(1, OPENNESS.format("surfels"), REFIT, only_of="surfels"),
+    "gap_error_fine": Signal(1, OPENNESS.format("small voxels"), REFIT),
+    "gap_error_coarse": Signal(1, OPENNESS.format("large voxels"), REFIT),
     "lowest_sun_deg": Signal(-1, "the sun stands as low as {value:.0f}°", LIGHT),
     "direct_share": Signal(-1, "{value:.0%} of the light comes straight from the sun", LIGHT),
     "light_contrast": Signal(
@@ -130,6 +154,18 @@ SIGNALS = {
     "difference_polygons_fine": Signal(
         0, "polygons let {value:+.0%} more light through than small voxels", DISAGREEMENT
     ),
+    "r_surfels_fine": Signal(
+        -1,
+        "light of surfels and small voxels correlates with {value:.2f}",
+        DISAGREEMENT,
+        only_of="surfels",
+    ),
+    "difference_surfels_fine": Signal(
+        0,
+        "surfels let {value:+.0%} more light through than small voxels",
+        DISAGREEMENT,
+        only_of="surfels",
+    ),
     "r_fine_coarse": Signal(
         -1, "light of small and large voxels correlates with {value:.2f}", DISAGREEMENT
     ),
@@ -138,6 +174,12 @@ SIGNALS = {
     ),
     "sensitivity_polygons": Signal(
         1, "moved sensors change light by {value:.2f} of its spread (polygons)", PLACES
+    ),
+    "sensitivity_surfels": Signal(
+        1,
+        "moved sensors change light by {value:.2f} of its spread (surfels)",
+        PLACES,
+        only_of="surfels",
     ),
     "sensitivity_fine": Signal(
         1, "moved sensors change light by {value:.2f} of its spread (small voxels)", PLACES

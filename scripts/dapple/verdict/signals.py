@@ -6,8 +6,9 @@ import numpy as np
 import xarray as xr
 
 from dapple.structure.summary import voxel_area_m2
-from dapple.verdict import signals_light, signals_scan, signals_structure
+from dapple.verdict import signals_light, signals_rescan, signals_scan, signals_structure
 from dapple.verdict.run_data import RunData
+from dapple.virtual import rescan
 
 SEED = 20_240_823
 """Draws the points and beams that are looked at: the same run gives the same signals."""
@@ -31,7 +32,8 @@ def measure(run: RunData) -> dict[str, float]:
     fine = run.voxels[sizes[0]] if sizes else None
     coarse = run.voxels[sizes[-1]] if len(sizes) > 1 else None
     names = (sizes[0] if sizes else "", sizes[-1] if len(sizes) > 1 else "")
-    return _of_scan(run, fine) | _of_structure(run, fine, coarse) | _of_light(run, *names)
+    found = _of_scan(run, fine) | _of_structure(run, fine, coarse)
+    return found | _of_surfels(run, fine) | _of_rescan(run, fine, coarse) | _of_light(run, *names)
 
 
 def _of_scan(run: RunData, fine: xr.Dataset | None) -> dict[str, float]:
@@ -91,12 +93,50 @@ def _of_structure(
     }
 
 
+def _of_surfels(run: RunData, fine: xr.Dataset | None) -> dict[str, float]:
+    facts = run.surfel_facts
+    # A scanner that moves has shots, but none that tell of discs.
+    untold = 0.0 if run.surfels is not None and run.shots is not None else math.nan
+    shots = facts.get("shots_per_disc") or untold
+    surfels_m2 = run.surfels.area_m2 if run.surfels is not None else math.nan
+    fine_m2 = math.nan if fine is None else voxel_area_m2(fine)
+    return {
+        "shots_per_surfel": shots,
+        "surfels_without_surface": facts.get("without_surface", math.nan),
+        "area_surfels_to_fine": signals_structure.log_ratio(surfels_m2, fine_m2),
+    }
+
+
+def _of_rescan(
+    run: RunData, fine: xr.Dataset | None, coarse: xr.Dataset | None
+) -> dict[str, float]:
+    wood = {"wood": run.wood}
+    made = {
+        "polygons": (wood | {"leaf": run.leaves}, None) if run.leaves.n_elements else None,
+        "surfels": None if run.surfels is None else (wood | {"leaf": run.surfels}, None),
+        "fine": None if fine is None else (wood, fine),
+        "coarse": None if coarse is None else (wood, coarse),
+    }
+    found = {f"gap_error_{name}": math.nan for name in made}
+    if run.shots is None or not len(run.cloud) or not len(run.shots.range_m):
+        return found
+    crown = rescan.crown_of(run.cloud)
+    fired = signals_rescan.some_patches(run.shots, crown, np.random.default_rng(SEED))
+    scanner = rescan.scanner_of(run.cloud, [run.shots], **run.beam)
+    for name, one in made.items():
+        if one is not None:
+            error = signals_rescan.gap_error(*one, fired, crown, scanner, seed=SEED)
+            found[f"gap_error_{name}"] = error
+    return found
+
+
 def _of_light(run: RunData, fine: str, coarse: str) -> dict[str, float]:
     light, moved = run.light, run.moved_light
     zenith = run.sun_zenith_deg
     r_fine, difference_fine = signals_light.agreement(light.get("polygons"), light.get(fine))
     r_coarse, difference_coarse = signals_light.agreement(light.get(fine), light.get(coarse))
-    names = ("polygons", fine, coarse)
+    r_surfels, difference_surfels = signals_light.agreement(light.get("surfels"), light.get(fine))
+    names = ("polygons", "surfels", fine, coarse)
     some = next((light[n] for n in names if n in light), None)
     return {
         "lowest_sun_deg": 90 - float(np.max(zenith)) if zenith is not None else math.nan,
@@ -104,9 +144,12 @@ def _of_light(run: RunData, fine: str, coarse: str) -> dict[str, float]:
         "light_contrast": signals_light.contrast(some),
         "r_polygons_fine": r_fine,
         "difference_polygons_fine": difference_fine,
+        "r_surfels_fine": r_surfels,
+        "difference_surfels_fine": difference_surfels,
         "r_fine_coarse": r_coarse,
         "difference_fine_coarse": difference_coarse,
         "sensitivity_polygons": _sensitivity(light, moved, "polygons"),
+        "sensitivity_surfels": _sensitivity(light, moved, "surfels"),
         "sensitivity_fine": _sensitivity(light, moved, fine),
         "sensitivity_coarse": _sensitivity(light, moved, coarse),
         "clock_lag_min": signals_light.best_lag_min(some, run.measured_umol_m2_s),

@@ -117,7 +117,7 @@ def scored(rows: pd.DataFrame, tolerance_m: float) -> dict[str, float]:
         "predicted_passed_share": _mean(should_pass),
         "range_bias_m": float(np.median(apart_m[clear])) if clear.any() else np.nan,
         "range_near_share": _mean(near[clear]),
-        "gap_rmse": _gap_rmse(rows, passed, should_pass),
+        "gap_rmse": gap_rmse(rows),
     }
 
 
@@ -144,17 +144,30 @@ def _mean(values: np.ndarray) -> float:
     return float(np.mean(values)) if len(values) else np.nan
 
 
-def _gap_rmse(rows: pd.DataFrame, passed: np.ndarray, should_pass: np.ndarray) -> float:
+def patches_of(zenith_deg: np.ndarray, azimuth_deg: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Row and column of the patch that each direction lies in, (n,) int64."""
+    row = (zenith_deg / PATCH_DEG).astype(np.int64)
+    column = azimuth_deg * np.sin(np.radians(zenith_deg)) / PATCH_DEG
+    return row, column.astype(np.int64)
+
+
+def gap_rmse(rows: pd.DataFrame) -> float:
+    """Error of the share of shots that pass, as in `scored`; NaN where all patches are too small.
+
+    Parameters
+    ----------
+    rows : pandas.DataFrame
+        Of `compared`.
+    """
+    row, column = patches_of(rows["zenith_deg"].to_numpy(), rows["azimuth_deg"].to_numpy())
     patches = (
         pd.DataFrame(
             {
                 "scan": rows["scan"],
-                "row": (rows["zenith_deg"] / PATCH_DEG).astype(int),
-                "column": (
-                    rows["azimuth_deg"] * np.sin(np.radians(rows["zenith_deg"])) / PATCH_DEG
-                ).astype(int),
-                "passed": passed.astype(float),
-                "predicted": should_pass.astype(float),
+                "row": row,
+                "column": column,
+                "passed": np.isinf(rows["seen_m"]).astype(float),
+                "predicted": np.isinf(rows["predicted_m"]).astype(float),
             }
         )
         .groupby(["scan", "row", "column"])[["passed", "predicted"]]

@@ -1,0 +1,177 @@
+"""Do intervals of plant area hold the truth in as many cases as they say?
+
+    python benchmarks/plant_area.py learn         constants of structure/plant_area.py, on 40 crowns
+    python benchmarks/plant_area.py judge         docs/data/plant_area*.csv, on 60 others
+
+Crowns are discs in a ball, evenly or in clumps, scanned from one to eight places with beams that
+have no width. The true area of a voxel is that of the parts of discs that lie in it. Ten of the
+judged crowns are scanned once more with beams as wide as a scanner's: no interval knows of those.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "scripts"))
+
+from dapple.formats import meshes  # noqa: E402
+from dapple.structure import plant_area  # noqa: E402
+from dapple.structure.voxel_sums import Grid  # noqa: E402
+from dapple.structure.voxels import plant_area_density  # noqa: E402
+from dapple.virtual import scanner  # noqa: E402
+
+LEARNED, JUDGED = range(40), range(2000, 2060)
+WIDE = range(2000, 2010)
+SIZE_M, FILL_RANGE_M, MOST_DISCS, PARTS = 0.2, 0.5, 12_000, 48
+CLUMP_DISCS, CLUMP_M = 20, 0.08
+
+
+def crown(rng: np.random.Generator) -> tuple[np.ndarray, float]:
+    """Radius, centre and normal of discs (n, 7), and their mean area [m²]."""
+    half_m = rng.uniform([0.4, 0.4, 0.4], [1.0, 1.0, 1.0])
+    radius_m = np.exp(rng.uniform(np.log(0.01), np.log(0.04)))
+    density = rng.uniform(0.5, 5.0)
+    n = int(4 / 3 * np.pi * half_m.prod() * density / (np.pi * radius_m**2))
+    if n > MOST_DISCS:
+        radius_m, n = radius_m * np.sqrt(n / MOST_DISCS), MOST_DISCS
+    is_clumped = rng.random() < 0.5
+    clumps = rng.standard_normal((max(n // CLUMP_DISCS, 1), 3))
+    places = clumps if is_clumped else rng.standard_normal((n, 3))
+    places /= np.linalg.norm(places, axis=1, keepdims=True)
+    places *= half_m * rng.random((len(places), 1)) ** (1 / 3)
+    if is_clumped:
+        places = places[rng.integers(0, len(places), n)]
+        places = places + CLUMP_M * rng.standard_normal((n, 3))
+    normal = rng.standard_normal((n, 3))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    own_m = radius_m * np.sqrt(rng.uniform(0.5, 1.5, n))
+    return np.column_stack([own_m, places + np.array([0, 0, 1.6]), normal]), float(
+        np.pi * radius_m**2
+    )
+
+
+def area_by_voxel(discs: np.ndarray, voxels: xr.Dataset) -> np.ndarray:
+    """True area in every voxel: that of 48 equal parts of each disc [m²]."""
+    k = np.arange(PARTS)
+    out, turn = np.sqrt((k + 0.5) / PARTS), k * np.pi * (3 - np.sqrt(5))
+    normal = discs[:, 4:]
+    across = np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=1)])
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    along = np.cross(normal, across)
+    parts = (out * np.cos(turn))[:, None] * across[:, None]
+    parts = parts + (out * np.sin(turn))[:, None] * along[:, None]
+    places = discs[:, None, 1:4] + discs[:, 0, None, None] * parts
+    shape = tuple(voxels.sizes[axis] for axis in "xyz")
+    index = np.floor((places.reshape(-1, 3) - voxels.attrs["corner_m"]) / SIZE_M).astype(int)
+    flat = np.ravel_multi_index(tuple(np.clip(index, 0, np.array(shape) - 1).T), shape)
+    area = np.repeat(np.pi * discs[:, 0] ** 2 / PARTS, PARTS)
+    return np.bincount(flat, area, int(np.prod(shape))).reshape(shape)
+
+
+def scanned(seed: int, *, is_wide: bool = False) -> tuple[xr.Dataset, np.ndarray, float, int]:
+    """Voxels of a crown, their true areas, area of an element [m²] and number of positions."""
+    rng = np.random.default_rng(seed)
+    discs, element_m2 = crown(rng)
+    positions = int(rng.choice([1, 2, 3, 4, 6, 8]))
+    mesh = meshes.of_discs(discs)
+    beam = {} if is_wide else {"sub_rays": 1, "range_noise_m": 0.0}
+    shots = scanner.scan(
+        {"leaf": mesh},
+        scanner.positions_around(np.zeros(3), 4.0, positions),
+        angular_step_deg=float(np.exp(rng.uniform(np.log(0.12), np.log(1.2)))),
+        noise_points_per_shot=0.0,
+        seed=seed,
+        **beam,
+    )
+    bounds_m = np.array([mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)])
+    grid = Grid.around(bounds_m, SIZE_M)
+    voxels = plant_area_density(shots, grid, contact_voxel_m=0, max_pad_m2_m3=20.0)
+    return voxels, area_by_voxel(discs, voxels), element_m2, positions
+
+
+def compared(seed: int, *, is_wide: bool = False) -> pd.DataFrame:
+    """Estimated and true areas of the voxels, layers and the whole of a crown."""
+    voxels, true_m2, element_m2, positions = scanned(seed, is_wide=is_wide)
+    found = plant_area.of_voxels(voxels, element_area_m2=element_m2, fill_range_m=FILL_RANGE_M)
+    low_m2, high_m2 = plant_area.interval_m2(found.area_m2, found.variance_m4)
+    beams_m2 = 1.96 * voxels["standard_error_m2_m3"].to_numpy() * SIZE_M**3
+    in_crown = (true_m2 > 0) | (found.area_m2 > 0)
+    of_voxels = pd.DataFrame(
+        {
+            "part": np.where(found.is_filled, "voxel filled", "voxel seen")[in_crown],
+            "true_m2": true_m2[in_crown],
+            "plant_area_m2": found.area_m2[in_crown],
+            "likely_m2": found.area_m2[in_crown],
+            "low_m2": low_m2[in_crown],
+            "high_m2": high_m2[in_crown],
+            "beams_alone": (np.abs(found.area_m2 - true_m2) <= beams_m2)[in_crown],
+            "by_beams_m4": (beams_m2[in_crown] / 1.96) ** 2,
+        }
+    )
+    parts = plant_area.by_part(found)
+    parts["true_m2"] = [true_m2.sum(), *true_m2.sum(axis=(0, 1))]
+    parts = parts[parts["true_m2"] > 0].drop(columns="height_m")
+    rows = pd.concat([of_voxels, parts], ignore_index=True)
+    facts = {"crown": seed, "positions": positions, "element_m2": element_m2, "is_wide": is_wide}
+    return rows.assign(**facts)
+
+
+def coverage(rows: pd.DataFrame) -> pd.DataFrame:
+    """Share of true areas within the intervals, by part and for some groups of crowns."""
+    held = (rows["true_m2"] >= rows["low_m2"] - 1e-9) & (rows["true_m2"] <= rows["high_m2"] + 1e-9)
+    rows = rows.assign(held=held, width=(rows["high_m2"] - rows["low_m2"]) / rows["plant_area_m2"])
+    thin = rows[~rows["is_wide"]]
+    groups = {
+        "all": thin,
+        "1 position": thin[thin["positions"] == 1],
+        "2 or 3 positions": thin[thin["positions"].isin([2, 3])],
+        "4 to 8 positions": thin[thin["positions"] >= 4],
+        "beams with a width": rows[rows["is_wide"]],
+    }
+    found = []
+    for name, group in groups.items():
+        for part, own in group.groupby("part"):
+            estimates = own[["plant_area_m2", "likely_m2"]]
+            near = (estimates.div(own["true_m2"], axis=0) - 1).abs().le(0.03).mean()
+            found.append(
+                {
+                    "crowns": name,
+                    "part": part,
+                    "cases": len(own),
+                    "coverage": own["held"].mean(),
+                    "coverage_of_beams_alone": own["beams_alone"].astype(float).mean(),
+                    "bias": own["plant_area_m2"].sum() / own["true_m2"].sum() - 1,
+                    "bias_likely": own["likely_m2"].sum() / own["true_m2"].sum() - 1,
+                    "within_3_percent": near["plant_area_m2"],
+                    "likely_within_3_percent": near["likely_m2"],
+                    "median_width": own["width"].replace(np.inf, np.nan).median(),
+                }
+            )
+    return pd.DataFrame(found)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("what", choices=("learn", "judge"))
+    parser.add_argument("--docs", type=Path, default=ROOT / "docs")
+    options = parser.parse_args()
+    seeds = LEARNED if options.what == "learn" else JUDGED
+    rows = [compared(seed) for seed in seeds]
+    if options.what == "judge":
+        rows += [compared(seed, is_wide=True) for seed in WIDE]
+    rows = pd.concat(rows, ignore_index=True)
+    table = coverage(rows)
+    print(table.to_string())
+    if options.what == "judge":
+        crowns = rows[rows["part"] == "crown"].drop(columns=["part", "beams_alone", "by_beams_m4"])
+        table.to_csv(options.docs / "data/plant_area.csv", index=False, float_format="%.4g")
+        crowns.to_csv(options.docs / "data/plant_area_crowns.csv", index=False, float_format="%.4g")
+
+
+if __name__ == "__main__":
+    main()
