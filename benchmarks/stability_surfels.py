@@ -3,7 +3,8 @@
     snakemake --cores 1 --configfile config/stability-surfels.yaml
     python benchmarks/stability_surfels.py results/stability-surfels/stability/batches
 
-Writes medians by stressor and level (docs/data/stability_surfels.csv), how the verdict did on runs
+Writes r and error by stressor and level (docs/data/stability_surfels.csv), those where another
+reconstruction errs less (docs/data/stability_surfels_lost.csv), how the verdict did on runs
 that it was not fitted to (docs/data/verdict_surfels.csv), and the models of surfels into
 scripts/dapple/verdict/verdict_model.json. The models of other reconstructions stay: they are
 fitted to three worlds, without surfels (config/stability.yaml).
@@ -47,7 +48,10 @@ def main() -> None:
             told.append({"signals": kind, "check": check} | found)
     json.write(options.model, stored)
     data = options.docs / "data"
-    levels(points).to_csv(data / "stability_surfels.csv", index=False, float_format="%.4g")
+    every = levels(points)
+    every.to_csv(data / "stability_surfels.csv", index=False, float_format="%.4g")
+    loses = every[every["best"] != OWN]
+    loses.to_csv(data / "stability_surfels_lost.csv", index=False, float_format="%.4g")
     pd.DataFrame(told).to_csv(data / "verdict_surfels.csv", index=False, float_format="%.3g")
     print(pd.DataFrame(told).to_string())
 
@@ -65,6 +69,8 @@ def levels(points: pd.DataFrame) -> pd.DataFrame:
         found[f"r_{column}"] = wide["r"][name]
         found[f"rmse_{column}"] = wide["rmse_rel"][name]
     found["leaf_area_m2"] = wide["leaf_area_m2"][OWN]
+    own = points[points["reconstruction"] == OWN].set_index(key)
+    found["harmless"] = own["harmless"].groupby(key).first().reindex(found.index)
     best = wide["rmse_rel"][names].idxmin(axis=1)
     flagged = alarms(points)
     return found.assign(best=best, alarm=flagged.reindex(found.index)).reset_index()
