@@ -114,6 +114,17 @@ def test_a_signal_of_surfels_judges_no_other_reconstruction():
     assert "surfels_without_surface" not in models["voxels_1.0"]["signals"]
 
 
+def test_discs_on_no_surface_are_red_whatever_the_model_says():
+    models = fitting.fit(stress(USUAL))
+    models["surfels"] = models["polygons"]
+    signals = usual_signals(surfels_without_surface=0.9)
+    told = judgement.judge(signals, ("polygons", "surfels"), models)["reconstructions"]
+    assert told["surfels"]["state"] == "red"
+    assert told["surfels"]["expected_loss"] >= 1
+    assert "90%" in told["surfels"]["reasons"][0]["text"]
+    assert told["polygons"]["state"] != "red"
+
+
 def test_no_weight_calls_off_an_alarm():
     models = fitting.fit(stress(USUAL))
     for model in models.values():

@@ -55,7 +55,7 @@ def judge(
         if all(not math.isfinite(signals.get(name, math.nan)) for name in names)
     ]
     judged = {
-        name: _judge_one(signals, models[name], unknown)
+        name: _bounded(name, signals, _judge_one(signals, models[name], unknown))
         for name in reconstructions
         if name in models
     }
@@ -92,6 +92,18 @@ def _judge_one(signals: dict[str, float], model: dict, unknown: list) -> dict:
             if loss > 0.1 * by_signals
         ],
     }
+
+
+def _bounded(name: str, signals: dict[str, float], judged: dict) -> dict:
+    """Red, whatever the model says, where a signal of this reconstruction is beyond its bound."""
+    for key, signal in SIGNALS.items():
+        value = signals.get(key, math.nan)
+        if signal.only_of == name and value > signal.most:
+            learned = {"usual": 0.0, "low": 0.0, "high": signal.most}
+            judged["reasons"] = [_reason(1.0, key, value, learned)]
+            judged["expected_loss"] = max(judged["expected_loss"], 1.0)
+            judged["state"] = STATES[-1]
+    return judged
 
 
 def _reason(share: float, name: str, value: float, learned: dict) -> dict:

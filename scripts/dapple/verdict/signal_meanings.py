@@ -21,6 +21,8 @@ class Signal:
         Judged by its logarithm.
     only_of : str
         The reconstruction that alone is judged by it: others may come without that one.
+    most : float
+        Beyond it no model is asked: what `only_of` names stands on nothing.
     """
 
     worse: int
@@ -28,6 +30,7 @@ class Signal:
     help: str
     is_log: bool = False
     only_of: str = ""
+    most: float = math.inf
 
     def tell(self, value: float) -> str:
         """What a value of the signal says, in words."""
@@ -131,7 +134,11 @@ SIGNALS = {
         -1, "{value:.1f} shots tell how open a disc is", DENSER, is_log=True, only_of="surfels"
     ),
     "surfels_without_surface": Signal(
-        1, "{value:.0%} of the discs lie on no surface that points show", DENSER, only_of="surfels"
+        1,
+        "{value:.0%} of the discs lie on no surface that points show",
+        f"{DENSER} Until then take polygons or voxels.",
+        only_of="surfels",
+        most=0.5,
     ),
     "area_surfels_to_fine": Signal(
         0,
