@@ -161,9 +161,7 @@ def run_data(
     meshes = _tried(lambda: chain.polygons(conditions))
     if isinstance(meshes, InputError):
         meshes = {"leaf": empty(), "wood": empty()}
-    surfels = None, {}
-    if "surfels" in light:
-        surfels = chain.surfels(conditions)
+    discs, facts = chain.surfels(conditions) if "surfels" in light else (None, {})
     voxels = {
         name_of(size_m): _tried(lambda m=size_m: chain.voxels(conditions, m))
         for size_m in chain.setup.sizes_m
@@ -176,8 +174,8 @@ def run_data(
         points_per_polygon=points_per_polygon(
             cloud, meshes["leaf"], chain.polygon_size_m(conditions)
         ),
-        surfels=surfels[0],
-        surfel_facts=surfels[1],
+        surfels=discs,
+        surfel_facts=facts,
         beam={
             "exit_aperture_m": chain.setup.surfels["beam_diameter_m"],
             "beam_divergence_mrad": chain.setup.surfels["beam_divergence_mrad"],

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import xarray as xr
 
+from dapple.formats.meshes import Mesh
 from dapple.structure.summary import voxel_area_m2
 from dapple.verdict import signals_light, signals_rescan, signals_scan, signals_structure
 from dapple.verdict.run_data import RunData
@@ -111,7 +112,7 @@ def _of_rescan(
     run: RunData, fine: xr.Dataset | None, coarse: xr.Dataset | None
 ) -> dict[str, float]:
     wood = {"wood": run.wood}
-    made = {
+    made: dict[str, tuple[dict[str, Mesh], xr.Dataset | None] | None] = {
         "polygons": (wood | {"leaf": run.leaves}, None) if run.leaves.n_elements else None,
         "surfels": None if run.surfels is None else (wood | {"leaf": run.surfels}, None),
         "fine": None if fine is None else (wood, fine),
@@ -125,8 +126,10 @@ def _of_rescan(
     scanner = rescan.scanner_of(run.cloud, [run.shots], **run.beam)
     for name, one in made.items():
         if one is not None:
-            error = signals_rescan.gap_error(*one, fired, crown, scanner, seed=SEED)
-            found[f"gap_error_{name}"] = error
+            meshes, voxels = one
+            found[f"gap_error_{name}"] = signals_rescan.gap_error(
+                meshes, voxels, fired, crown, scanner, seed=SEED
+            )
     return found
 
 
