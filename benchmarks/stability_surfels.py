@@ -1,13 +1,11 @@
-"""How surfels hold under stress, and the verdict's model of them, from one world.
+"""How surfels hold under stress, and whether the verdict tells, in one world.
 
     snakemake --cores 1 --configfile config/stability-surfels.yaml
     python benchmarks/stability_surfels.py results/stability-surfels/stability/batches
 
 Writes r and error by stressor and level (docs/data/stability_surfels.csv), those where another
-reconstruction errs less (docs/data/stability_surfels_lost.csv), how the verdict did on runs
-that it was not fitted to (docs/data/verdict_surfels.csv), and the models of surfels into
-scripts/dapple/verdict/verdict_model.json. The models of other reconstructions stay: they are
-fitted to three worlds, without surfels (config/stability.yaml).
+reconstruction errs less (docs/data/stability_surfels_lost.csv), and how the stored verdict does on
+surfels (docs/data/verdict_surfels.csv): its models were fitted to other worlds, without surfels.
 """
 
 import argparse
@@ -19,11 +17,11 @@ import pandas as pd
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "scripts"))
 
-from dapple.formats import json  # noqa: E402
 from dapple.verdict import fitting, judgement  # noqa: E402
 
 OWN = "surfels"
 BESIDE = ("polygons", "voxels_0.2", "voxels_1.0")
+KEY = ["stressor", "level", "label"]
 RATES = ("runs", "failures", "failed_levels", "detection", "detection_traced", "false_alarms")
 
 
@@ -31,24 +29,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--docs", type=Path, default=ROOT / "docs")
-    parser.add_argument("--model", type=Path, default=judgement.MODEL)
     options = parser.parse_args()
     tables = [pd.read_csv(path, dtype={"label": str}) for path in sorted(options.folder.glob("*"))]
     points = pd.concat(tables, ignore_index=True)
-    stored = json.read(options.model)
-    told = []
-    for kind in ("scan", "records"):
-        runs = points[points["reconstruction"] == OWN].reset_index(drop=True)
-        with_records = kind == "records"
-        stored[kind]["models"] |= fitting.fit(runs, with_records=with_records)
-        rates = fitting.validate(runs, with_records=with_records)
-        stored[kind]["rates_of_surfels"] = rates
-        for check in ("halves", "unseen_stressor"):
-            found = {name: rates[check][name] for name in RATES}
-            told.append({"signals": kind, "check": check} | found)
-    json.write(options.model, stored)
+    every, told = levels(points), []
+    for signals in ("scan", "records"):
+        models = judgement.load(with_records=signals == "records")
+        runs = fitting.prepared(points[points["reconstruction"] == OWN])
+        alarm = fitting.flagged(runs, models)
+        rates = fitting.rates(runs, alarm)
+        told.append({"signals": signals} | {name: rates[name] for name in RATES})
+        runs = points[points["reconstruction"] == OWN]
+        raised = runs.assign(alarm=fitting.flagged(runs, models)).set_index(KEY)["alarm"]
+        every[f"alarm_{signals}"] = raised.groupby(KEY).max().reindex(every.index)
+    every = every.reset_index()
     data = options.docs / "data"
-    every = levels(points)
     every.to_csv(data / "stability_surfels.csv", index=False, float_format="%.4g")
     loses = every[every["best"] != OWN]
     loses.to_csv(data / "stability_surfels_lost.csv", index=False, float_format="%.4g")
@@ -58,29 +53,16 @@ def main() -> None:
 
 def levels(points: pd.DataFrame) -> pd.DataFrame:
     """r and relative RMSE of every level, of surfels and of what stands beside them."""
-    key = ["stressor", "level", "label"]
-    wide = points.pivot_table(
-        index=key, columns="reconstruction", values=["r", "rmse_rel", "leaf_area_m2"], sort=False
-    )
-    names = [OWN, *BESIDE]
+    values = ["r", "rmse_rel", "leaf_area_m2"]
+    wide = points.pivot_table(index=KEY, columns="reconstruction", values=values, sort=False)
     found = pd.DataFrame(index=wide.index)
-    for name in names:
+    for name in (OWN, *BESIDE):
         column = name.replace(".", "")
         found[f"r_{column}"] = wide["r"][name]
         found[f"rmse_{column}"] = wide["rmse_rel"][name]
     found["leaf_area_m2"] = wide["leaf_area_m2"][OWN]
-    own = points[points["reconstruction"] == OWN].set_index(key)
-    found["harmless"] = own["harmless"].groupby(key).first().reindex(found.index)
-    best = wide["rmse_rel"][names].idxmin(axis=1)
-    flagged = alarms(points)
-    return found.assign(best=best, alarm=flagged.reindex(found.index)).reset_index()
-
-
-def alarms(points: pd.DataFrame) -> pd.Series:
-    """Whether surfels were flagged by a model that was not fitted to the stressor, by level."""
-    runs = points[points["reconstruction"] == OWN].reset_index(drop=True)
-    told = fitting.unseen_flagged(runs, "stressor", with_records=False)
-    return runs.assign(alarm=told).groupby(["stressor", "level", "label"])["alarm"].max()
+    found["best"] = wide["rmse_rel"][[OWN, *BESIDE]].idxmin(axis=1)
+    return found
 
 
 if __name__ == "__main__":
