@@ -2,7 +2,7 @@
 CORES ?= 2
 BIN := .venv/bin
 
-.PHONY: run test test-all setup lint format docs site lock coverage hooks
+.PHONY: run test test-all setup lint format docs site lock coverage peers hooks
 
 run: setup
 	$(BIN)/snakemake --cores $(CORES)
@@ -36,6 +36,11 @@ format: setup
 # Lines that unit tests and closed forms run; jobs of the small runs are processes of their own.
 coverage: setup
 	$(BIN)/python -m pytest -q -n $(CORES) --cov --cov-report=term tests/unit tests/physics
+
+# Other programs on the shots of the default run, each in an environment of its own.
+peers: setup
+	$(BIN)/snakemake --cores $(CORES) -- results/virtual-apple/scan/shots.parquet
+	$(BIN)/python benchmarks/peers.py virtual-apple
 
 hooks: setup
 	$(BIN)/pre-commit install
