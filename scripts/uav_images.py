@@ -10,7 +10,7 @@ from dapple.optics import cameras
 from dapple.optics.bands import camera_mean
 from dapple.sky import spectrum
 from dapple.streams import stream_seed
-from dapple.virtual import camera, plot_optics
+from dapple.virtual import camera, less_camera, plot_optics
 from dapple.virtual.plot_materials import assemble
 from dapple.workflow import options, peak_rss_mb, run
 
@@ -36,25 +36,30 @@ def main(snakemake):
         ground=settings["ground"],
         seed=seed,
     )
-    scene = camera.build(world, materials)
     print(f"{len(world.faces)} triangles, {len(materials.reflectance)} materials")
-    del world
     built = time.perf_counter()
     view = camera.View.over(settings["size_m"], settings["pixel_m"])
-    paths, sun = settings["paths_per_pixel"], json.read(inputs.sun)
+    sun = json.read(inputs.sun)
     sky = spectrum.cloudless_diffuse_share(
         sun["sun_zenith_deg"], aerosol_optical_depth_500nm=settings["aerosol_optical_depth"]
     )
-    diffuse_share = camera_mean(*sky, seen_by)
-    image = camera.photograph(
-        scene,
-        view,
-        sun_zenith_deg=sun["sun_zenith_deg"],
-        sun_azimuth_deg=sun["sun_azimuth_deg"],
-        diffuse_share=diffuse_share,
-        paths_per_pixel=[paths[seen_by.is_infrared(k)] for k in range(0, len(seen_by), 3)],
-        seed=stream_seed(seed, "paths"),
-    )
+    light = {
+        "sun_zenith_deg": sun["sun_zenith_deg"],
+        "sun_azimuth_deg": sun["sun_azimuth_deg"],
+        "diffuse_share": camera_mean(*sky, seen_by),
+        "seed": stream_seed(seed, "paths"),
+    }
+    paths = settings["paths_per_pixel"]
+    if settings["renderer"] == "less":
+        centres = np.array([band.centre_nm for band in seen_by.bands])
+        # One set of paths serves all bands.
+        light |= {"wavelength_nm": centres, "paths_per_pixel": max(paths)}
+        image = less_camera.photograph(world, materials, view, **light)
+    else:
+        paths = [paths[seen_by.is_infrared(k)] for k in range(0, len(seen_by), 3)]
+        scene = camera.build(world, materials)
+        del world
+        image = camera.photograph(scene, view, **light, paths_per_pixel=paths)
     image = camera.with_noise(image, **settings["noise"], seed=stream_seed(seed, "noise"))
     rasters.write(
         snakemake.output.images,
@@ -70,7 +75,7 @@ def main(snakemake):
     facts = {
         "rows": view.rows,
         "columns": view.columns,
-        "diffuse_share": diffuse_share,
+        "diffuse_share": light["diffuse_share"],
         "mean_reflectance": image.mean(axis=(1, 2)).astype(float),
         "build_s": built - begun,
         "trace_s": time.perf_counter() - built,

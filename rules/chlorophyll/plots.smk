@@ -89,6 +89,7 @@ rule uav_images:
         wood=grown_files("wood"),
         sun=SUN,
         responses=RESPONSES,
+        runner=beside_code("virtual/less_camera_run.py"),
         code=code("uav_images"),
     output:
         images=plot_file("world/images.tif"),
@@ -106,6 +107,7 @@ rule uav_images:
         size_m=lambda wildcards: plot_of(wildcards).size_m,
         pixel_m=lambda wildcards: plot_of(wildcards).pixel_m,
         bands=BANDS,
+        renderer=WORLD.renderer,
         paths_per_pixel=WORLD.paths_per_pixel,
         noise={"relative": WORLD.relative_noise, "absolute": WORLD.absolute_noise},
         ground=WORLD_GROUND,

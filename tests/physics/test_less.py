@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 from tests.physics.test_timestep import disc, leaves, level, optics, rays, voxels
 
+from dapple import programs
 from dapple.errors import InputError
 from dapple.formats.netcdf import time_coordinate
 from dapple.light import less_engine, less_files
@@ -186,7 +187,7 @@ def test_the_sky_on_the_grid_of_less_has_a_horizontal_irradiance_of_one():
 
 
 def test_without_less_the_message_says_what_to_do(monkeypatch):
-    monkeypatch.setattr(less_engine, "find_spec", lambda name: None)
+    monkeypatch.setattr(programs, "find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"pip install less3d==3\.0\.0"):
         run(Scene(), sky((30.0, 0.0)), sensors((0.0, 0.0, 0.0)), optics())
 

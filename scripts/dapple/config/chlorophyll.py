@@ -149,6 +149,9 @@ class World(Section):
     band_width_sd: Annotated[float, Ge(0), Le(0.3)] = key(
         0.08, "of their widths about the nominal ones, as a share; bands are bells, not windows"
     )
+    renderer: Literal["mitsuba", "less"] = key(
+        "mitsuba", "of the observed images; LESS 3 shares no code with what chlorophyll is told by"
+    )
     paths_per_pixel: tuple[Annotated[int, Ge(1), Le(4096)], Annotated[int, Ge(1), Le(4096)]] = key(
         (12, 32), "of the observed images, visible and infrared: scattered more often there"
     )

@@ -4,7 +4,6 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,6 @@ import pandas as pd
 import xarray as xr
 
 from dapple import programs
-from dapple.errors import InputError
 from dapple.formats import netcdf, tables
 from dapple.light import less_files
 from dapple.light.less_files import LessRays
@@ -63,7 +61,7 @@ def series(
     InputError
         LESS 3 is not installed, or does not know the leaf angles of voxels.
     """
-    _check_installed()
+    programs.check_less("light.engine: less")
     sky, optics = in_groups(sky, optics, bands)
     parts = []
     for placement, scene in enumerate(scenes):
@@ -105,14 +103,3 @@ def in_groups(sky: xr.Dataset, optics: Optics, bands: int) -> tuple[xr.Dataset, 
         for name, values in zip(FLUXES, (beam, diffuse), strict=True)
     }
     return sky.drop_dims("band").assign(grouped), optics.each(lambda values: values[order])
-
-
-def _check_installed() -> None:
-    if find_spec("less") is None:
-        raise InputError(
-            "light.engine: less",
-            "no LESS 3 in this environment",
-            "the Python package less3d, version 3.0.0",
-            "It has wheels for Linux and Windows on x86-64 with Python 3.10 to 3.13: "
-            "`pip install less3d==3.0.0` there, or choose another engine.",
-        )

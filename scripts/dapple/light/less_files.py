@@ -12,7 +12,7 @@ import xarray as xr
 
 from dapple import frames
 from dapple.errors import InputError
-from dapple.formats import netcdf, tables
+from dapple.formats import less_obj, netcdf, tables
 from dapple.formats.meshes import Mesh
 from dapple.scene.facing import facing_of
 from dapple.scene.scene_optics import Optics
@@ -106,7 +106,7 @@ def write(
     objects = []
     for number, one in enumerate(scene.filled):
         name = f"{one.optics}_{number}"
-        _write_obj(folder / f"{name}.obj", one.optics, one.mesh)
+        less_obj.write(folder / f"{name}.obj", one.mesh, [one.optics])
         shifts = np.zeros((1, 3)) if one.places_m is None else one.places_m
         objects.append(
             {
@@ -159,7 +159,7 @@ def _plates(
     found = []
     for number, normal in enumerate(ways):
         name = f"plate_{number}"
-        _write_obj(folder / f"{name}.obj", "plate", _square(width_m, normal))
+        less_obj.write(folder / f"{name}.obj", _square(width_m, normal), ["plate"])
         mine = places[way.ravel() == number]
         found.append({"name": name, "mesh": f"{name}.obj", "places_m": mine.tolist()})
     return found
@@ -180,21 +180,6 @@ def _cube() -> Mesh:
     return Mesh(corners, faces, np.zeros(len(faces), np.int32))
 
 
-def _write_obj(path: Path, group: str, mesh: Mesh) -> None:
-    """Triangles as one named group, with flat normals: LESS smooths surfaces that have none."""
-    normal = frames.local_to_less(mesh.triangle_normal)
-    length = np.linalg.norm(normal, axis=1, keepdims=True)
-    kept = length[:, 0] > 0.0
-    corners = mesh.faces[kept] + 1
-    number = np.arange(1, len(corners) + 1)
-    faces = np.stack([corners[:, 0], number, corners[:, 1], number, corners[:, 2], number], axis=1)
-    with path.open("w", encoding="ascii", newline="\n") as file:
-        file.write(f"# dapple, metres, axes of LESS: -east, up, north\ng {group}\n")
-        np.savetxt(file, frames.local_to_less(mesh.vertices_m), fmt="v %.6f %.6f %.6f")
-        np.savetxt(file, normal[kept] / length[kept], fmt="vn %.6f %.6f %.6f")
-        np.savetxt(file, faces, fmt="f %d//%d %d//%d %d//%d")
-
-
 def _voxels(folder: Path, scene: Scene, corner_m: np.ndarray) -> dict[str, Any] | None:
     """Turbid cubes by classes of density, or None where there are none."""
     grid = turbid_grid(scene.voxels)
@@ -208,7 +193,7 @@ def _voxels(folder: Path, scene: Scene, corner_m: np.ndarray) -> dict[str, Any] 
             f"one of {', '.join(known)}",
             "Choose one of these distributions, or another engine.",
         )
-    _write_obj(folder / "cube.obj", "cube", _cube())
+    less_obj.write(folder / "cube.obj", _cube(), ["cube"])
     density = grid.plant_area_density_m2_m3
     where = np.argwhere(density > 0.0)
     values = density[density > 0.0]
