@@ -41,7 +41,7 @@ rule estimate:
     params:
         snakefile=str(HOME / "Snakefile"),
         settings=settings.model_dump(mode="json"),
-        cores=workflow.cores or 1,
+        cores=lambda wildcards: workflow.cores or 1,
         known=lambda wildcards: known_before(),
     message:
         said("what a run would take")

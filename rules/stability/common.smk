@@ -39,7 +39,7 @@ def stability_setup():
         "surfels": SURFELS,
         "voxels": settings.voxels.model_dump(exclude={"sizes_m"}),
         "sizes_m": settings.voxels.sizes_m,
-        "leaves": settings.leaves.model_dump(),
+        "leaves": settings.leaves.model_dump(exclude={"path"}),
         "optics": OPTICS,
         "sensors": settings.sensors.grid(),
         "site": SKY["site"],

@@ -54,7 +54,7 @@ def world() -> Chain:
         voxels=settings.voxels.model_dump(exclude={"sizes_m"}) | {"contact_voxel_m": 0.0},
         leaves={},
         sensors={"columns": 8, "rows": 8, "spacing_m": 0.45, "height_m": 0.1},
-        site=settings.site.model_dump(exclude={"timezone"}),
+        site=settings.site.model_dump(exclude={"timezone", "crs"}),
         time=dict(settings.time) | {"step_min": 20.0},
         radiation={"linke_turbidity": 3.0},
         atmosphere=atmosphere,

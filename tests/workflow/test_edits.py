@@ -60,7 +60,8 @@ KEYS = {
     # The map of the ground shows level light, whatever sensors read.
     "sensors={response: hemispherical}": traced(5),
     "measured={noise_relative: 0.03}": COMPARED,
-    "registration={origin_m: [1, 0, 0]}": "",  # a grid stands in the tree's own frame
+    # A grid stands in the tree's own frame, but files of light tell world coordinates.
+    "registration={origin_m: [1, 0, 0]}": f"light*5 reference*5 agreement {MAP} {COMPARED}",
     "light={transport: {max_orders: 8}}": f"transport*5 light*5 agreement {COMPARED}",
     "light={transport: {max_shadow_rays: 99}}": f"light*5 agreement {COMPARED}",
     "light={timestep: {replicates: 5}}": checked(5),

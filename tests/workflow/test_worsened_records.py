@@ -25,7 +25,7 @@ def agreement(small_run, tmp_path_factory):
 def test_every_stressor_starts_from_the_undisturbed_agreement(agreement):
     undisturbed = agreement.xs(False, level="worsened").unstack("reconstruction")
     assert set(undisturbed.index) == set(HARMLESS)
-    assert set(undisturbed.columns) == {"polygons", "voxels_0.2", "voxels_1.0"}
+    assert set(undisturbed.columns) == {"polygons", "surfels", "voxels_0.2", "voxels_1.0"}
     assert (undisturbed.nunique() == 1).all()
 
 

@@ -140,8 +140,9 @@ def forecast(
         else:
             seconds = slowness * cost.seconds(now[driver])
             megabytes = cost.megabytes(now[driver])
-            if job.before and earlier is not None:
-                seconds = job.before[0] * cost.seconds(now[driver]) / cost.seconds(earlier[driver])
+            then = 0.0 if earlier is None else cost.seconds(earlier[driver])
+            if job.before and then > 0.0:  # 0: there was nothing to do
+                seconds = job.before[0] * cost.seconds(now[driver]) / then
         one = sums.setdefault(job.rule, [0, 0.0, 0.0])
         one[0], one[1], one[2] = one[0] + 1, one[1] + seconds, max(one[2], megabytes)
         width = min(job.threads, cores)
