@@ -6,19 +6,22 @@ import os
 import shutil
 import sys
 from collections.abc import Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 from tests.workflow.project import ENVIRONMENT, ROOT
+
+LIMIT_S = 600
+"""For all of them together; they take a minute or two."""
 
 
 def many(runs: Iterable[tuple[Path, Sequence[str]]]) -> list[str]:
     """What Snakemake says when it is run in a folder with arguments, two at a time."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["snakemake.cli"])
-    with ProcessPoolExecutor(2, mp_context=context, max_tasks_per_child=1) as pool:
-        return list(pool.map(_run, *zip(*runs, strict=True)))
+    # Not an executor of concurrent.futures: with a process for each task it may wait for ever.
+    with context.Pool(2, maxtasksperchild=1) as pool:
+        return pool.starmap_async(_run, runs, chunksize=1).get(LIMIT_S)
 
 
 def _run(folder: Path, arguments: Sequence[str]) -> str:
