@@ -7,7 +7,6 @@ import subprocess
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from importlib.util import find_spec
 from pathlib import Path
 
 from dapple.errors import InputError
@@ -42,18 +41,6 @@ def find(program: str, remedy: str, *, beside: Sequence[Path] = ()) -> str:
         if found := shutil.which(candidate):
             return found
     raise InputError(program, "no such program", f"one of {', '.join(candidates)}", remedy)
-
-
-def check_less(key: str) -> None:
-    """Refuse a setting (`key: value`) that needs LESS 3 where it is not installed."""
-    if find_spec("less") is None:
-        raise InputError(
-            key,
-            "no LESS 3 in this environment",
-            "the Python package less3d, version 3.0.0",
-            "It has wheels for Linux and Windows on x86-64 with Python 3.10 to 3.13: "
-            "`pip install less3d==3.0.0` there, or choose another value.",
-        )
 
 
 def limit_s(n_points: int) -> float:

@@ -1,9 +1,7 @@
 """LESS 3 on dapple's files against closed forms and against dapple's own engines."""
 
-import os
-import subprocess
-import sys
 from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -11,7 +9,7 @@ import pytest
 import xarray as xr
 from tests.physics.test_timestep import disc, leaves, level, optics, rays, voxels
 
-from dapple import programs
+from dapple import less3
 from dapple.errors import InputError
 from dapple.formats.netcdf import time_coordinate
 from dapple.light import less_engine, less_files
@@ -160,16 +158,16 @@ def test_less_and_mitsuba_see_the_same_light_under_a_small_crown():
 
 
 @WITH_LESS
-def test_an_exported_scene_run_without_dapple_gives_the_light_of_the_engine(tmp_path):
+def test_an_exported_scene_run_without_dapple_gives_the_light_of_the_engine(tmp_path, monkeypatch):
     crown = leaves(50, 0.2, (-0.8, -0.8, 0.8), (0.8, 0.8, 2.0), seed=3)
     scene = Scene(of_kinds(leaf=crown, wood=level((-0.1, 0.1), (-0.1, 0.1), 0.7)))
     table, spectra = sensors((0.3, 0.0, 0.2), (-0.4, 0.5, 0.0)), optics(0.3, 0.2, 0.4, 0.3)
     above = sky((35.0, 140.0), coefficients=PEREZ)
     numbers = LessRays(640, 2, max_orders=12, sun_diameter_deg=0.0, seed=1)
     less_files.write(tmp_path, scene, spectra, above, table, numbers)
-    command = [sys.executable, "less_run.py", "."]
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    subprocess.run(command, cwd=tmp_path, env=environment, check=True, capture_output=True)
+    monkeypatch.delenv("PYTHONPATH", raising=False)
+    monkeypatch.chdir(tmp_path)
+    less3.run(Path("less_run.py"), Path())
     written = pd.read_csv(tmp_path / "light.csv")
     found = run(scene, above, table, spectra, n_rays=640, diameter=0.0)
     assert written["sensor"].tolist() == ["1_0", "1_1"]
@@ -187,7 +185,7 @@ def test_the_sky_on_the_grid_of_less_has_a_horizontal_irradiance_of_one():
 
 
 def test_without_less_the_message_says_what_to_do(monkeypatch):
-    monkeypatch.setattr(programs, "find_spec", lambda name: None)
+    monkeypatch.setattr(less3, "find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"pip install less3d==3\.0\.0"):
         run(Scene(), sky((30.0, 0.0)), sensors((0.0, 0.0, 0.0)), optics())
 

@@ -1,6 +1,5 @@
 """Light at sensors by LESS 3, which runs in a process of its own on files of its own."""
 
-import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,7 +9,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from dapple import programs
+from dapple import less3
 from dapple.formats import netcdf, tables
 from dapple.light import less_files
 from dapple.light.less_files import LessRays
@@ -61,7 +60,7 @@ def series(
     InputError
         LESS 3 is not installed, or does not know the leaf angles of voxels.
     """
-    programs.check_less("light.engine: less")
+    less3.check("light.engine: less")
     sky, optics = in_groups(sky, optics, bands)
     parts = []
     for placement, scene in enumerate(scenes):
@@ -85,7 +84,7 @@ def simulate(folder: Path) -> dict[str, np.ndarray]:
         `par`, its parts `direct`, `sky`, `scattered`, and its `standard_error`, in the unit of the
         folder's light. What LESS prints is printed.
     """
-    print(programs.run([sys.executable, folder / less_files.RUNNER.name, folder]))
+    print(less3.run(folder / less_files.RUNNER.name, folder))
     table = tables.read(folder / "light.csv")
     n_sensors = len(tables.read(folder / "sensors.csv"))
     return {name: table[name].to_numpy().reshape(-1, n_sensors).T for name in PARTS}

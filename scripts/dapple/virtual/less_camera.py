@@ -1,14 +1,13 @@
 """Images of a virtual plot from above by LESS 3, which shares no code with dapple's own tracing."""
 
 import json
-import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
 from scipy.cluster.vq import kmeans2
 
-from dapple import frames, programs
+from dapple import frames, less3
 from dapple.formats import less_obj
 from dapple.formats.meshes import Mesh
 from dapple.virtual.camera import View
@@ -70,7 +69,7 @@ def photograph(
     InputError
         LESS 3 is not installed.
     """
-    programs.check_less("chlorophyll.world.renderer: less")
+    less3.check("chlorophyll.world.renderer: less")
     order = np.argsort(wavelength_nm)
     used = few(materials, seed)
     low, high = mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)
@@ -99,7 +98,7 @@ def photograph(
         names = [f"m{k}" for k in range(len(used.reflectance))]
         less_obj.write(folder / "world.obj", mesh, names, used.of_face)
         (folder / "world.json").write_text(json.dumps(facts))
-        print(programs.run([sys.executable, RUNNER, folder]))
+        print(less3.run(RUNNER, folder))
         return np.load(folder / "image.npy")[np.argsort(order)].astype(np.float32)
 
 
