@@ -141,8 +141,9 @@ def taught(
     parts = network.split(frame["combination"].to_numpy(), seed=split)
     bands = training_entries.features(frame, ZHAO.names)
     target = training_entries.chlorophyll(frame)
-    relative, absolute = retrieval.relative_noise, retrieval.absolute_noise
-    noise = Noise(relative, relative, absolute, absolute) if robust else None
+    absolute = retrieval.absolute_noise
+    errors = Noise(retrieval.relative_noise, retrieval.common_noise, absolute, absolute)
+    noise = errors if robust else None
     low, high = retrieval.chlorophyll_ug_cm2[:2]
     margin = 0.1 * (high - low)
     names = ("hidden", "batch", "max_epochs", "patience")

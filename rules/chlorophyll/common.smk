@@ -195,7 +195,7 @@ NETWORK = {
 SPLIT = {"test_share": RETRIEVAL.test_share, "held_share": RETRIEVAL.held_share}
 ERRORS = {
     "relative": RETRIEVAL.relative_noise,
-    "relative_common": RETRIEVAL.relative_noise,
+    "relative_common": RETRIEVAL.common_noise,
     "absolute": RETRIEVAL.absolute_noise,
     "absolute_common": RETRIEVAL.absolute_noise,
 }

@@ -260,7 +260,11 @@ class Retrieval(Section):
     )
     dry_matter_g_cm2: GridRange = key((0.0, 0.03, 4), "dry matter per leaf area", ZHAO)
     water_cm: GridRange = key((0.005, 0.03, 4), "equivalent water thickness", "Feret et al. 2008")
-    brown: GridRange = key((0.0, 0.8, 5), "brown pigments", ZHAO)
+    brown: GridRange = key(
+        (0.0, 0.2, 4),
+        "brown pigments: green leaves have few or none; [0, 0.8, 5], as published, for dying ones",
+        "none in the green leaves of PROSPECT-5 (Feret et al. 2008)",
+    )
     soil_brightness: GridRange = key((0.01, 0.7, 4), "of the soil", ZHAO)
     soil_moisture: GridRange = key((0.01, 0.78, 4), "of the soil, a share of saturation", ZHAO)
     shoot_recollision: GridRange = key(
@@ -282,7 +286,12 @@ class Retrieval(Section):
         ("robust", "published"), "that learn from bands with errors, or from exact ones"
     )
     relative_noise: NotNegative = key(
-        0.05, "robust: errors of each band and of all together, as a share of the value"
+        0.05, "robust: error of each band on its own, as a share of the value"
+    )
+    common_noise: NotNegative = key(
+        0.2,
+        "robust: error that all bands share, as a share of the value: calibration, and how much "
+        "of the crown is lit",
     )
     absolute_noise: NotNegative = key(
         0.002, "robust: errors of each band and of all together, as reflectance"

@@ -28,7 +28,7 @@ class Noise:
     """
 
     relative: float = 0.05
-    relative_common: float = 0.05
+    relative_common: float = 0.2
     absolute: float = 0.002
     absolute_common: float = 0.002
 
