@@ -43,15 +43,41 @@ CLEAR = (
     "%b %d %Y %H:%M:%S",
     "%d %B %Y %H:%M",
     "%B %d %Y %H:%M",
+    "%d. %b %Y %H:%M",
+    "%d. %b %Y %H:%M:%S",
+    "%d %b %Y %I:%M %p",
+    "%b %d %Y %I:%M %p",
+    "%d-%b-%y %H:%M",
+    "%d-%b-%y %H:%M:%S",
 )
 CLOCKS = ("%H:%M", "%H:%M:%S", "%H:%M:%S.%f", "%I:%M %p", "%I:%M:%S %p")
 DAY_FIRST, MONTH_FIRST = (
     [f"{date}{year} {clock}" for clock in CLOCKS for year in ("%Y", "%y")]
     for date in ("%d/%m/", "%m/%d/")
 )
+MONTHS = {
+    "Jan": "january januar jänner janvier janv enero ene gennaio gen januari janeiro",
+    "Feb": "february februar feber fevrier février févr fevr febrero febbraio februari fevereiro "
+    "fev",
+    "Mar": "march märz maerz mär mrz mars marzo maart mrt março marco",
+    "Apr": "april avril avr abril abr aprile",
+    "May": "mai mayo maggio mag mei maj maio",
+    "Jun": "june juni juin junio giugno giu junho",
+    "Jul": "july juli juillet juil julio luglio lug julho",
+    "Aug": "august août aout agosto ago augustus augusti",
+    "Sep": "september sept septembre septiembre settembre set setembro",
+    "Oct": "october oktober okt octobre octubre ottobre ott outubro out",
+    "Nov": "november novembre noviembre novembro",
+    "Dec": "december dezember dez décembre decembre déc diciembre dic dicembre dezembro des",
+}
+"""Months in languages of Europe, by the letters that English writes them with."""
+MONTH_OF = {name: month for month, names in MONTHS.items() for name in names.split()}
+WEEKDAY = rf"^(?!(?:{'|'.join(MONTHS)})\b)[^\W\d_]{{2,10}}\.?\s+(?=\d)"
 HALF_DAY = r"(?<=\d)\s*([AaPp])(?:\.?\s?[Mm])?\.?$"
 """AM, p.m. and a behind a time."""
 FIRST_YEAR, LAST_YEAR = 1950, 2100
+A_GAP = pd.Timedelta(days=2)
+"""Rows of one table are rarely further apart: more tells that day and month are exchanged."""
 
 
 def naive(text: pd.Series, where: str, time_format: str = "") -> pd.DatetimeIndex:
@@ -78,21 +104,40 @@ def naive(text: pd.Series, where: str, time_format: str = "") -> pd.DatetimeInde
         .str.replace(r",(?=\s)", "", regex=True)
         .str.replace(",", ".")
     )
-    plain = plain.str.replace(HALF_DAY, r" \1M", regex=True).str.upper()
+    plain = plain.str.replace(HALF_DAY, r" \1M", regex=True)
+    plain = plain.str.replace(r"\s*Uhr$", "", regex=True)
+    plain = plain.str.replace(r"[^\W\d_]{3,}\.?", _in_english, regex=True)
+    plain = plain.str.replace(WEEKDAY, "", regex=True).str.upper()
     plain, next_day = _midnights(plain)
-    found = _first_of([ISO, *CLEAR], plain)[1]
+    way, found = _first_of([ISO, *CLEAR], plain)
+    if way.startswith("%d.%m."):
+        found = _by_steps(plain, way, found)
     if found is None:
-        # 8/10/2023 and 8-10-2023: which is the day?
-        slashed = plain.str.replace(r"^(\d{1,2})-(\d{1,2})-(\d{2,4})", r"\1/\2/\3", regex=True)
+        # 8/10/2023, 8-10-2023 and 8.10.2023: which is the day?
+        slashed = plain.str.replace(r"^(\d\d?)[-.](\d\d?)[-.](\d{2,4})", r"\1/\2/\3", regex=True)
         found = _day_or_month(slashed, where)
     if found is None:
         raise _no_time(text, plain, where)
     return pd.DatetimeIndex(found) + pd.to_timedelta(next_day.to_numpy().astype(int), unit="D")
 
 
+def _in_english(match: re.Match[str]) -> str:
+    """The month that a word is, in three letters; 10. is 10 before it."""
+    return MONTH_OF.get(match[0].lower().rstrip("."), match[0])
+
+
+def _by_steps(text: pd.Series, way: str, by_day: pd.Series | None) -> pd.Series | None:
+    """Days and months with points, which Americans exchange: as the rows follow each other."""
+    by_month = _first_of([way.replace("%d.%m.", "%m.%d.")], text)[1]
+    if by_day is None or by_month is None:
+        return by_day
+    longest = [times.sort_values().diff().max() for times in (by_day, by_month)]
+    return by_month if longest[1] <= A_GAP < longest[0] else by_day
+
+
 def _declared(text: pd.Series, where: str, time_format: str) -> pd.DatetimeIndex:
     if time_format in ("epoch", "excel"):
-        numbers = pd.to_numeric(text, errors="coerce")
+        numbers = pd.to_numeric(text.str.replace(",", "."), errors="coerce")
         unit, origin = ("s", "unix") if time_format == "epoch" else ("D", "1899-12-30")
         if time_format == "epoch" and numbers.min() > 1e11:  # milliseconds
             numbers = numbers / 1e3
@@ -100,6 +145,7 @@ def _declared(text: pd.Series, where: str, time_format: str) -> pd.DatetimeIndex
         times = times.dt.round("s") if time_format == "excel" else times
     else:
         plain = text.str.replace(HALF_DAY, r" \1M", regex=True) if "%p" in time_format else text
+        time_format = re.sub(r"\s*%p", " %p", time_format)
         plain, next_day = _midnights(plain)
         times = pd.to_datetime(plain, format=time_format, errors="coerce")
         times = times + pd.to_timedelta(next_day.astype(int), unit="D")
@@ -141,7 +187,7 @@ def _day_or_month(text: pd.Series, where: str) -> pd.Series | None:
     if day is None or month is None or day.equals(month):
         return month if day is None else day
     longest = [times.sort_values().diff().max() for times in (day, month)]
-    if min(longest) <= pd.Timedelta(days=2) < max(longest):
+    if min(longest) <= A_GAP < max(longest):
         return day if longest[0] < longest[1] else month
     raise InputError(
         where,

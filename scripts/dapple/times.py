@@ -15,7 +15,7 @@ from dapple.errors import InputError
 # day before it: the year of 10-08-2023 is no offset.
 OFFSET = (
     r"(?:(?:(?<=:\d\d)|(?<=[.,]\d{3})|(?<=[.,]\d{6}))\s*(?P<offset>[+\-−]\d{2}:?\d{2})|"
-    r"(?<=\d)\s*(?P<name>(?:UTC|GMT)[+\-−]\d{1,2}(?::\d\d)?|(?!AM|PM|am|pm)[A-Za-z]{2,5}|Z))$"
+    r"(?<=\d)\s*(?P<name>(?:UTC|GMT)[+\-−]\d{1,2}(?::\d\d)?|(?!AM|PM|am|pm|Uhr)[A-Za-z]{2,5}|Z))$"
 )
 
 

@@ -56,12 +56,18 @@ def find_timezone(name: str, where: str = "timezone") -> ZoneInfo | timezone:
     """
     text = str(name).strip()
     known = available_timezones()
-    pattern = r"(?:UTC|GMT|UT|Z)?\s*([+\-−])(\d{1,2})(?::?([0-5]\d))?(?:\s*h)?"
+    pattern = r"(?:UTC|GMT|UT|Z)?\s*([+\-−])\s*(\d{1,2})(?::?([0-5]\d))?(?:\s*h)?"
     if offset := re.fullmatch(pattern, text, re.IGNORECASE):
         sign, hours, minutes = offset.groups()
         delta = timedelta(hours=int(hours), minutes=int(minutes or 0))
         if delta <= timedelta(hours=14):
             return timezone(delta if sign == "+" else -delta)
+    if unsigned := re.fullmatch(r"(?:UTC|GMT|UT)?\s*(\d{1,2})", text, re.IGNORECASE):
+        hours = int(unsigned[1])
+        raise InputError(
+            where, f"the time zone '{name}'", "an offset with its sign",
+            f"Write '+{hours:02d}:00' where clocks are ahead of Greenwich, else '-{hours:02d}:00'.",
+        )  # fmt: skip
     if (unclear := UNCLEAR.get(text.lower())) and text not in known:
         raise InputError(
             where, f"the time zone '{name}'", f"one of several: {unclear}", "Write its offset."

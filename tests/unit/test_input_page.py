@@ -8,6 +8,7 @@ import pytest
 import rasterio
 import yaml
 from rasterio.transform import from_origin
+from tests.unit.weather import FREIBURG
 
 from dapple.code_use import SCRIPTS
 from dapple.config.settings import validate
@@ -62,6 +63,24 @@ TABLES = {
     "MIDC of NREL": "DATE (MM/DD/YYYY),MST,Global Horizontal [W/m^2],Direct Normal [W/m^2],"
     "Diffuse Horizontal [W/m^2]\n08/10/2023,03:00,500.0,700.0,100.0\n"
     "08/10/2023,03:01,501.0,700.0,100.0\n",
+    "METER ZL6 or Decagon Em50": "z6-1,Port 1,Port 2\n2 records,ATMOS 41,ATMOS 41\n"
+    "Timestamps,W/m² Solar Radiation,mm Rain\n2023-08-10 11:00:00,500,0\n"
+    "2023-08-10 11:15:00,510,0\n",
+    "Davis WeatherLink, text": "\t\tTemp\tSolar\tHi Solar\nDate\tTime\tOut\tRad.\tRad.\n"
+    "08/10/23\t11:00a\t20.1\t500\t520\n08/10/23\t11:30a\t20.1\t510\t530\n",
+    "NASA POWER hourly": "-BEGIN HEADER-\nNASA/POWER CERES/MERRA2 Native Resolution Hourly Data\n"
+    "Dates (month/day/year): 08/10/2023 through 08/10/2023 in UTC\n"
+    "ALLSKY_SFC_SW_DWN      CERES SYN1deg All Sky Surface Shortwave (Wh/m^2)\n-END HEADER-\n"
+    "YEAR,MO,DY,HR,ALLSKY_SFC_SW_DWN\n2023,8,10,10,500\n2023,8,10,11,-999\n",
+    "ERA5 hourly series": "valid_time,ssrd,latitude,longitude\n"
+    "2023-08-10 10:00:00,1800000,48,8\n2023-08-10 11:00:00,1836000,48,8\n",
+    # The sun is 37.8° from the zenith over Freiburg at this time.
+    "diffuse and direct normal radiation, without global": "time_utc,dhi,dni\n"
+    "2023-08-10 10:00,100,506.0\n2023-08-10 10:10,100,500\n",
+    "diffuse and direct radiation on the horizontal": "time_utc,diffuse,direct\n"
+    "2023-08-10 10:00,100,400\n2023-08-10 10:10,100,410\n",
+    "illuminance above the trees in lux": "time_utc,global [lux]\n2023-08-10 10:00,55000\n"
+    "2023-08-10 10:10,55100\n",
     "CSV of a spreadsheet, day and clock apart": "Datum;Uhrzeit;Globalstrahlung [W/m²]\n"
     "10.08.2023;12:00;500,0\n10.08.2023;12:10;1.001,5\n",
     "rows with the start and the end of an interval": "Beginn;Ende;Globalstrahlung [W/m²]\n"
@@ -70,6 +89,8 @@ TABLES = {
 RECORDS = {
     "HOBO export": ("logger_3_7.csv", '"Plot Title: a"\n"#","Date Time, GMT+02:00","PAR, uE"\n'
                     "1,08/10/23 12:00:00 PM,500\n2,08/10/23 12:01:00 PM,501\n"),
+    "records of a lux meter": ("lux.csv", "sensor,time_utc,par [lux]\n3_7,2023-08-10 10:00,27000\n"
+                               "3_7,2023-08-10 10:01,27001\n"),
     "a column for each sensor": ("wide.csv", "TIMESTAMP,PAR_3_7_Avg,PAR_3_7_Std,PAR_3_8_Avg\n"
                                  "2023-08-10 10:00,500,3,600\n2023-08-10 10:01,501,3,601\n"),
 }  # fmt: skip
@@ -94,11 +115,12 @@ def test_every_row_is_tested_and_there_are_twelve_at_least():
 def test_radiation_is_read_in_its_unit_and_zone(have, tmp_path):
     (tmp_path / "a.csv").write_text(TABLES[have], encoding="utf-8")
     section = written(have).radiation
-    columns = {key: getattr(section, key) for key in ("global_column", "diffuse_column")}
+    own = ("global_column", "diffuse_column", "direct_column", "direct_plane")
+    columns = {key: getattr(section, key) for key in own}
     declared = section.model_dump(include=set(radiation_table.Declared.__dataclass_fields__))
-    found = radiation_table.read(tmp_path / "a.csv", **columns, **declared)
+    found = radiation_table.read(tmp_path / "a.csv", site=FREIBURG, **columns, **declared)
     assert found.table.index[0] == HOUR
-    assert found.table["global_w_m2"].iloc[0] == pytest.approx(500.0)
+    assert found.table["global_w_m2"].iloc[0] == pytest.approx(500.0, abs=0.5)
 
 
 @pytest.mark.parametrize("have", RECORDS)
@@ -108,7 +130,7 @@ def test_records_are_read_by_sensor(have, tmp_path):
     places = pd.DataFrame({"sensor": ["3_7", "3_8"], "x_m": 0.0, "y_m": 0.0, "z_m": 0.0})
     found = measured.read(tmp_path / name, sensors=places, **written(have).measured.table()).table
     assert found["time"].iloc[0] == HOUR
-    assert found["par_umol_m2_s"].iloc[0] == 500.0
+    assert found["par_umol_m2_s"].iloc[0] == pytest.approx(500.0)
 
 
 @pytest.mark.parametrize("have", IMAGES)

@@ -192,7 +192,7 @@ def test_text_that_is_neither_number_nor_flag_is_refused_with_its_line(tmp_path)
         ("µmol m-2 s-1", "umol/m2/s"),
         ("par_umolm2s", "umol/m2/s"),
         ("uE", "umol/m2/s"),
-        ("lux", None),
+        ("lux", "lx"),
         ("Glob_Avg", None),
     ],
 )

@@ -44,6 +44,7 @@ def half_day(t):
 
 
 IN_UTC = {"timezone": "UTC"}
+EXCEL = pd.Timestamp("1899-12-30", tz="UTC")
 READ = {
     "day and clock in a column called after days": (
         lines("Datum;Globalstrahlung [W/m²]", "%d.%m.%Y %H:%M", GLOBAL, sep=";", number=comma),
@@ -81,6 +82,94 @@ READ = {
     ),
     "sums of calories": (
         lines("time,global [cal/cm2]", "%Y-%m-%dT%H:%MZ", GLOBAL * 1800 / 4.184e4), {},
+    ),
+    "hours with a fraction": (
+        lines("date,hour,ghi", lambda t: f"{t:%Y-%m-%d},{t.hour + t.minute / 60:.4f}", GLOBAL),
+        IN_UTC,
+    ),
+    "day of the year and hours with a fraction": (
+        lines("year,doy,hour,ghi",
+              lambda t: f"{t.year},{t.day_of_year},{t.hour + t.minute / 60:.2f}", GLOBAL), IN_UTC,
+    ),
+    "day of the year with a fraction": (
+        lines("year;doy;ghi",
+              lambda t: comma(f"{t.year};{t.day_of_year + (t.hour + t.minute / 60) / 24:.5f}"),
+              GLOBAL, sep=";", number=comma), IN_UTC,
+    ),
+    "year, month, day and clock": (
+        lines("Station,Year,Month,Day,Time [UTC],Global radiation mean [W/m2]",
+              lambda t: f"Kumpula,{t.year},{t.month},{t.day},{t:%H:%M}", GLOBAL), {},
+    ),
+    "days of a spreadsheet with commas": (
+        lines("time;ghi", lambda t: comma(f"{(t - EXCEL) / pd.Timedelta('1D'):.6f}"), GLOBAL,
+              sep=";", number=comma), IN_UTC | {"time_format": "excel"},
+    ),
+    "a German month and Uhr": (
+        lines("Zeit;ghi", lambda t: f"{t:%d}. August {t:%Y, %H:%M} Uhr", GLOBAL, sep=";",
+              number=comma), IN_UTC,
+    ),
+    "a French month": (
+        lines("Date;ghi", lambda t: f"{t:%d} août {t:%Y %H:%M}", GLOBAL, sep=";", number=comma),
+        IN_UTC,
+    ),
+    "as mails are stamped": (
+        lines("time,ghi", lambda t: t.strftime('"%a, %d %b %Y %H:%M:%S GMT"'), GLOBAL), {},
+    ),
+    "months before days, with points": (
+        lines("time;ghi", "%m.%d.%Y %H:%M", GLOBAL, sep=";"), IN_UTC,
+    ),
+    "a zone behind the name": (
+        lines("Time_MESZ,ghi", "%Y-%m-%d %H:%M", GLOBAL, zone="+02:00"), {},
+    ),
+    "a logger's export for the web": (
+        lines('"Line#","Date","Solar Radiation (S-LIB 2:2-1),W/m^2,Plot","Temp, *C"',
+              lambda t: f"1,{t:%m/%d/%y %H:%M:%S}", GLOBAL, GLOBAL), IN_UTC,
+    ),
+    "METER": (
+        lines("z6-1,Port 1,Port 1\n3 records,ATMOS 41,ATMOS 41\n"
+              "Timestamps,W/m² Solar Radiation,mm Rain", "%Y-%m-%d %H:%M:%S", GLOBAL, GLOBAL),
+        IN_UTC,
+    ),
+    "Davis": (
+        lines("\t\tTemp\tSolar\tHi Solar\nDate\tTime\tOut\tRad.\tRad.",
+              lambda t: f"{t:%m/%d/%y}\t{half_day(t)[11:]}\t20", GLOBAL, GLOBAL + 9, sep="\t"),
+        IN_UTC | {"time_format": "%m/%d/%y %I:%M%p"},
+    ),
+    "a title over a table of WeatherLink": (
+        lines('"Plot"\n"Davis"\n\n"Date & Time","Bar - mb","Solar Rad - W/m^2"',
+              lambda t: f'"{t:%m/%d/%y %H:%M}","1,013.2"', GLOBAL), IN_UTC,
+    ),
+    "a break in the name of a column": (
+        lines('time,"ghi\n(W/m²)"', "%Y-%m-%dT%H:%MZ", GLOBAL), {},
+    ),
+    "semicolons within quotes": (
+        lines("time,ghi,note", "%Y-%m-%dT%H:%MZ", GLOBAL, ['"a; b; c; d"'] * len(UTC)), {},
+    ),
+    "files behind one another": (
+        lines("time,ghi", "%Y-%m-%dT%H:%MZ", GLOBAL).replace(
+            "2023-08-20T09:00Z", "time,ghi\n2023-08-20T09:00Z"), {},
+    ),
+    "remarks in brackets": (
+        lines("time,Global Irradians (svenska stationer)", "%Y-%m-%dT%H:%MZ", GLOBAL), {},
+    ),
+    "an hour in brackets": (
+        lines("Tid(norsk normaltid);Globalstråling (1 t)", "%d.%m.%Y %H:%M", GLOBAL, sep=";",
+              number=comma), IN_UTC,
+    ),
+    "megajoules in an hour": (
+        lines("time,global [MJ/m²/h]", "%Y-%m-%dT%H:%MZ", GLOBAL * 0.0036), {},
+    ),
+    "watts per Quadratmeter": (lines("time,global [W/qm]", "%Y-%m-%dT%H:%MZ", GLOBAL), {}),
+    "joules a second": (lines("time,global [J m-2 s-1]", "%Y-%m-%dT%H:%MZ", GLOBAL), {}),
+    "direct and diffuse": (
+        lines("time,bhi,dhi", "%Y-%m-%dT%H:%MZ", GLOBAL - DIFFUSE, DIFFUSE), {},
+    ),
+    "illuminance that is declared": (
+        lines("time,global [klx]", "%Y-%m-%dT%H:%MZ", GLOBAL * 0.11), {"unit": "klx"},
+    ),
+    "an object a line": (
+        "\n".join(json.dumps({"time": f"{t:%Y-%m-%dT%H:%MZ}", "ghi": g})
+                  for t, g in zip(UTC, GLOBAL, strict=True)), {},
     ),
     "rows in JSON": (
         json.dumps([{"time": f"{t:%Y-%m-%dT%H:%MZ}", "ghi": g}
@@ -126,7 +215,22 @@ def test_rows_with_start_and_end_are_means_stamped_with_the_start(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "flag", ["***", "#####", "-99.9", "-9999.9", "1e30", "-8888", ".", "1.#QNAN", "Invalid"]
+    "flag",
+    [
+        "***",
+        "#####",
+        "-99.9",
+        "-9999.9",
+        "1e30",
+        "-8888",
+        ".",
+        "1.#QNAN",
+        "Invalid",
+        "9999.9",
+        "-999999",
+        "32767",
+        "65535",
+    ],
 )
 def test_a_flag_of_a_logger_is_a_missing_value_and_counted(tmp_path, flag):
     with_flag = [flag if k == 10 else value for k, value in enumerate(GLOBAL)]
@@ -142,7 +246,19 @@ REFUSED = {
         "interval_label: start",
     ),
     "no zone": (lines("time,ghi", "%Y-%m-%d %H:%M", GLOBAL), "as `timezone` of this table"),
-    "light for the eye": (lines("time,ghi [klx]", "%Y-%m-%dT%H:%MZ", GLOBAL), "18.5 µmol"),
+    "thousands or decimals": (
+        lines("time;ghi", "%Y-%m-%dT%H:%MZ", np.round(3 * GLOBAL), sep=";",
+              number=lambda value: f"{value:,.0f}".replace(",", ".")),
+        "Set `decimal`",
+    ),
+    "sums since midnight": (
+        lines("valid_time,ssrd,latitude", "%Y-%m-%d %H:%M:%S", np.cumsum(GLOBAL) * 3600, GLOBAL),
+        "differences between hours",
+    ),
+    "direct radiation on some plane": (
+        lines("time,direct,diffuse", "%Y-%m-%dT%H:%MZ", GLOBAL, DIFFUSE), "direct_plane: normal"),
+    "light for the eye": (
+        lines("time,ghi [klx]", "%Y-%m-%dT%H:%MZ", GLOBAL), "radiation.unit: klx"),
     "broken JSON": ('{"outputs": {"hourly": [', "broken JSON"),
     "JSON without rows": ('{"outputs": {"hourly": 5}}', "no table in the JSON"),
     "a tilted plane": (
@@ -213,3 +329,47 @@ def test_of_several_columns_of_light_none_is_taken_for_the_one_sensor_of_the_fil
 def test_photons_are_read_in_their_units(tmp_path, unit, factor):
     found = records(tmp_path, f"sensor,time,PAR [{unit}]\nA1,2023-08-20T10:00Z,{500 * factor}\n")
     assert found.table["par_umol_m2_s"].tolist() == pytest.approx([500])
+
+
+def test_the_hours_of_nasa_power_are_those_of_fifteen_degrees_of_longitude(tmp_path):
+    hours = slice(None, None, 2)
+    head = ("-BEGIN HEADER-\nNASA/POWER CERES/MERRA2 Native Resolution Hourly Data \n"
+            "Dates (month/day/year): 08/20/2023 through 08/20/2023 in LST\n"
+            "Location: Latitude  48.0   Longitude 20.1 \nParameter(s): \n"
+            "ALLSKY_SFC_SW_DWN      CERES SYN1deg All Sky Irradiance (MJ/hr) \n-END HEADER-\n"
+            "YEAR,MO,DY,HR,ALLSKY_SFC_SW_DWN\n")  # fmt: skip
+    rows = "".join(
+        f"{t:%Y},{t.month},{t.day},{t.hour},{0.0036 * g}\n"
+        for t, g in zip(UTC[hours].tz_convert("+01:00"), GLOBAL[hours], strict=True)
+    )
+    found = read(tmp_path, head + rows).table
+    assert (found.index == UTC[hours]).all()
+    np.testing.assert_allclose(found["global_w_m2"], GLOBAL[hours], atol=0.1)
+
+
+def test_hours_of_era5_are_sums_before_their_stamp_and_its_beam_is_level(tmp_path):
+    hours = slice(None, None, 2)
+    text = "valid_time,ssrd,fdir\n" + "".join(
+        f"{t:%Y-%m-%d %H:%M:%S},{3600 * g},{3600 * (g - d)}\n"
+        for t, g, d in zip(UTC[hours], GLOBAL[hours], DIFFUSE[hours], strict=True)
+    )
+    found = read(tmp_path, text)
+    assert (found.label, found.interval_min) == ("end", 60.0)
+    np.testing.assert_allclose(found.table["global_w_m2"], GLOBAL[hours], atol=0.1)
+    np.testing.assert_allclose(found.table["diffuse_w_m2"], DIFFUSE[hours], atol=0.1)
+
+
+@pytest.mark.parametrize("zone", ["UTC 1", "2", "GMT1"])
+def test_an_offset_without_its_sign_is_not_guessed(tmp_path, zone):
+    text = lines("time,ghi", "%Y-%m-%d %H:%M", GLOBAL)
+    with pytest.raises(InputError, match="ahead of Greenwich"):
+        read(tmp_path, text, timezone=zone)
+
+
+def test_records_in_lux_are_daylight_only_where_somebody_says_so(tmp_path):
+    text = "sensor,time,PAR [lux]\nA1,2023-08-20T10:00Z,54000\n"
+    with pytest.raises(InputError, match=r"`measured.unit: lx`.*18\.5 µmol"):
+        records(tmp_path, text)
+    found = records(tmp_path, text, unit="lx")
+    assert found.table["par_umol_m2_s"].tolist() == pytest.approx([1000])
+    assert "twice as bright" in " ".join(map(str, found.findings))

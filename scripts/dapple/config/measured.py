@@ -21,9 +21,9 @@ class Measured(TimedTable):
     par_column: str = key(
         "", "column of PAR, or a pattern such as PAR_{sensor}_Avg; empty: by its usual name"
     )
-    unit: Literal["", "umol/m2/s", "mmol/m2/s", "mol/m2", "mmol/m2", "W/m2"] = key(
-        "", "of the records, sums over the interval; empty: as the header says, else umol/m2/s"
-    )
+    unit: Literal[
+        "", "umol/m2/s", "mmol/m2/s", "mol/m2/d", "mol/m2", "mmol/m2", "W/m2", "lx", "klx"
+    ] = key("", "of the records, sums over the interval; empty: as the header says, else umol/m2/s")
     noise_relative: NotNegative = key(0.02, "sensor model: relative standard deviation")
     noise_umol_m2_s: NotNegative = key(2.0, "sensor model: absolute standard deviation")
     calibration_relative: NotNegative = key(0.0, "sensor model: relative error of a whole sensor")

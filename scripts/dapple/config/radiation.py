@@ -32,9 +32,18 @@ class Radiation(TimedTable):
     diffuse_column: str = key(
         "", "column of diffuse radiation on the horizontal; empty: by its usual name, or none"
     )
+    direct_column: str = key(
+        "",
+        "column of direct radiation, which tells the one of the others that is not there; empty: "
+        "by its usual name",
+    )
+    direct_plane: Literal["", "normal", "horizontal"] = key(
+        "", "that the direct radiation falls on: facing the sun, or level; empty: as its name says"
+    )
     unit: Literal[
-        "", "W/m2", "kW/m2", "mW/cm2", "J/m2", "kJ/m2", "MJ/m2", "J/cm2", "Wh/m2", "kWh/m2"
-    ] = key("", "of both columns, sums over the interval; empty: as the header says, else W/m2")
+        "", "W/m2", "kW/m2", "mW/cm2", "J/m2", "kJ/m2", "MJ/m2", "J/cm2", "Wh/m2", "kWh/m2",
+        "kJ/m2/h", "MJ/m2/h", "J/cm2/h", "kJ/m2/min", "MJ/m2/d", "lx", "klx",
+    ] = key("", "of all columns, sums over the interval; empty: of the header")  # fmt: skip
     diffuse_model: Literal["erbs", "dirint"] = key(
         "erbs", "splits global radiation where diffuse is unknown", "Erbs et al. 1982"
     )

@@ -5,10 +5,12 @@ import unicodedata
 from collections.abc import Iterable
 
 UNIT_IN_HEADER = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*$")
-UNIT_AT_END = re.compile(r"^(?P<name>.+?)\s*(?:,|\s-)\s+(?P<unit>[^,]+)$")
-"""`Solar Rad. - W/m^2`, `PAR, uE`."""
-SERIAL = re.compile(r"\s*\([^()]*:[^()]*\)\s*$")
-"""What Onset's loggers add: `(LGR S/N: 1, SEN S/N: 2)`."""
+UNIT_AT_END = re.compile(r"^(?P<name>.+?)\s*(?:,|\s-|\sin)\s+(?P<unit>[^,]+)$")
+"""`Solar Rad. - W/m^2`, `PAR, uE`, `irradiance in W/sq m`."""
+UNIT_BEFORE = re.compile(r"^(?P<unit>[kMmuµμ]?(?:Wh?|J|mol)[^\w\s]\S*)\s+(?P<name>.+)$")
+"""`W/m² Solar Radiation`."""
+SERIAL = re.compile(r"\s*\([^()]*:[^()]*\)(?:\s*,(?P<unit>[^,]*).*)?\s*$")
+"""What Onset's loggers add: `(LGR S/N: 1, SEN S/N: 2)`, or `(S-LIB 2:2-1),W/m^2,Plot`."""
 UNIT_BEHIND = re.compile(r"[_ ]+k?w[_/ ]?m\^?-?[2²]$", re.IGNORECASE)
 """`ghi_wm2`."""
 OF_MEANS = re.compile(r"[_ .](avg|average|mean|mittel|tot|sum)\d*$", re.IGNORECASE)
@@ -19,7 +21,9 @@ TIME = ("time_utc", "time", "timestamp", "datetime", "date_time", "date time", "
         "zeit", "zeitstempel", "zeitpunkt", "messzeit", "datum/uhrzeit", "datum uhrzeit",
         "datum/zeit", "datum und uhrzeit", "date/heure", "date heure", "horodatage", "fecha/hora",
         "fecha hora", "fechahora", "data/ora", "data ora", "data/hora", "reference_timestamp",
-        "observation_time", "record_time", "tmstamp", "unix_time", "unixtime", "epoch")  # fmt: skip
+        "observation_time", "record_time", "tmstamp", "unix_time", "unixtime", "epoch",
+        "timestamps", "valid_time", "measurement_time", "tid", "tidpunkt", "tidspunkt", "tijd",
+        "aika")  # fmt: skip
 """Columns of whole time stamps, the likeliest first."""
 START = ("start", "from", "start_time", "start_date", "begin", "beginn", "anfang", "von", "debut",
          "inicio", "inizio", "desde", "interval_start", "period_start")  # fmt: skip
@@ -31,12 +35,13 @@ DATE = ("date", "datum", "fecha", "data", "dato", "day", "date_utc", "date_local
 CLOCK = ("time", "clock", "uhrzeit", "zeit", "heure", "hora", "ora", "tid", "time_utc",
          "time_local",         "hour", "hhmm", "hh:mm", "local_time")  # fmt: skip
 """Columns of days and of times of the day, where they are apart."""
-YEAR = ("year", "yr", "yyyy", "jahr", "annee", "ano")
+YEAR = ("year", "yr", "yyyy", "jahr", "annee", "ano",
+        "year month day hours minutes in yyyy")  # fmt: skip
 MONTH = ("month", "mon", "mo", "mm", "monat", "mois", "mes")
 DAY_OF_MONTH = ("day", "dy", "dd", "tag", "jour", "dia")
 DAY_OF_YEAR = ("doy", "jday", "julian_day", "day_of_year", "yday", "ddd")
-HOUR = ("hour", "hr", "hh", "stunde", "heure", "hora")
-MINUTE = ("minute", "minutes", "min", "mi", "mn")
+HOUR = ("hour", "hr", "hh", "stunde", "heure", "hora", "hh24")
+MINUTE = ("minute", "minutes", "min", "mi", "mn", "mi format in local standard time")
 
 GLOBAL = ("global_W_m2", "global", "ghi", "globalstrahlung", "global_radiation",
           "global_irradiance", "global_horizontal", "global_horizontal_irradiance",
@@ -48,7 +53,9 @@ GLOBAL = ("global_W_m2", "global", "ghi", "globalstrahlung", "global_radiation",
           "dw_solar", "shortwave_in", "shortwave_down", "shortwave_radiation",
           "incoming_shortwave",
           "incoming_shortwave_radiation", "solar_radiation", "solar_rad", "solar_irradiance",
-          "solar", "slrw", "srad", "solrad", "sol_rad", "strahlung", "rg", "rs", "rsd", "k_down",
+          "solar", "slrw", "slrkj", "slrmj", "srad", "global_irradians", "sunindstraaling",
+          "mean_global_irradiance", "globalbestraling", "globaalistraaling", "solrad", "sol_rad",
+          "strahlung", "rg", "rs", "rsd", "k_down",
           "kdown", "cglo", "gre000z0", "gre000h0", "allsky_sfc_sw_dwn", "pyranometer", "radiation",
           "irradiance", "total")  # fmt: skip
 DIFFUSE = ("diffuse_W_m2", "diffuse", "dhi", "diffus", "diffusstrahlung", "diffuse_radiation",
@@ -57,6 +64,17 @@ DIFFUSE = ("diffuse_W_m2", "diffuse", "dhi", "diffus", "diffusstrahlung", "diffu
            "diffuse_himmelsstrahlung", "rayonnement_diffus", "radiacion_difusa",
            "radiazione_diffusa", "sw_dif", "sw_diffuse", "dif", "diff", "rd", "rdif", "k_diffuse",
            "chim", "allsky_sfc_sw_diff", "ods000z0", "ods000h0")  # fmt: skip
+DIRECT_NORMAL = ("direct_normal_W_m2", "dni", "bni", "direct_normal", "direct_normal_irradiance",
+                 "direct_normal_radiation", "beam_normal", "beam_normal_irradiance", "gb(n)",
+                 "normal_direct_radiation", "direktnormalstrahlung", "allsky_sfc_sw_dni",
+                 "rayonnement_direct_normal", "radiacion_directa_normal")  # fmt: skip
+DIRECT_HORIZONTAL = ("direct_horizontal_W_m2", "bhi", "direct_horizontal",
+                     "direct_horizontal_irradiance", "beam_horizontal", "gb(h)", "fdir",
+                     "horizontal_direct_radiation", "rayonnement_direct_horizontal")  # fmt: skip
+DIRECT = ("direct_W_m2", "direct", "beam", "direct_radiation", "direct_irradiance",
+          "beam_radiation", "beam_irradiance", "direktstrahlung", "direkt", "rayonnement_direct",
+          "radiacion_directa", "sw_dir", "dir")  # fmt: skip
+"""Direct radiation that faces the sun, on the horizontal, or on a plane that the name hides."""
 PAR = ("par_umolm2s", "par_umol_m2_s", "par", "ppfd", "ppfd_in", "par_in", "par_down", "qpar",
        "ppf", "photon_flux", "photon_flux_density", "photosynthetic_photon_flux", "par_den",
        "par_flux", "par_flux_density", "quantum_flux", "ppfd_umol", "par_umol",
@@ -70,8 +88,9 @@ def plain(name: str) -> str:
     `GLOBALSTRAHLUNG_Avg` are `globalstrahlung`."""
     while match := UNIT_IN_HEADER.match(name.strip()):  # `Solar Radiation (W/m²) (S-LIB:1)`
         name = match["name"]
-    if match := UNIT_AT_END.match(name.strip()):
+    if match := UNIT_BEFORE.match(name.strip()) or UNIT_AT_END.match(name.strip()):
         name = match["name"]
+    name = SERIAL.sub("", name)
     name = OF_MEANS.sub("", UNIT_BEHIND.sub("", name.strip()))
     letters = unicodedata.normalize("NFKD", name.replace("ß", "ss")).lower()
     return re.sub(r"[^a-z0-9]", "", letters)

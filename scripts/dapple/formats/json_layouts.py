@@ -25,6 +25,10 @@ def recognise(path: Path, lines: Sequence[str]) -> Table | None:
     """
     if not lines[0].lstrip().startswith(("{", "[{")):
         return None
+    if len(filled := [line for line in lines if line.strip()]) > 1 and all(
+        line.lstrip().startswith("{") and line.rstrip().endswith("}") for line in filled
+    ):
+        lines = ["[", ",\n".join(filled), "]"]  # an object a line
     try:
         content = json.loads("\n".join(lines))
     except ValueError as error:

@@ -21,7 +21,7 @@ LARGEST = 2.0
 """Specular glints pass 1; what passes this by much is scaled."""
 LOWEST = -0.05
 DARKEST_BRIGHTEST, DIM_BRIGHTEST = 0.05, 0.15
-"""The brightest band of vegetation reflects more than this; below the second one may doubt it."""
+"""The brightest band of vegetation reflects more; below the first it is none at all."""
 
 
 def reflectance(
@@ -104,24 +104,18 @@ def check(path: Path, values: np.ndarray, camera: Sequence[CameraBand]) -> list[
                 f"{LOWEST:g} to {LARGEST:g}, and less than 1 at most pixels",
                 "Check `scale` and `nodata` of the plot.",
             )
-    if max(tops) < DARKEST_BRIGHTEST:
-        raise InputError(
-            path,
-            f"reflectance of at most {max(tops):.3g} in every band",
-            f"more than {DARKEST_BRIGHTEST:g} in the brightest: leaves reflect a third of the near "
-            "infrared",
-            "Check `scale` of the plot: the images look divided by too much.",
-        )
-    if max(tops) > DIM_BRIGHTEST:
+    top = max(tops)
+    if top > DIM_BRIGHTEST:
         return []
-    return [
-        findings.warning(
-            path,
-            f"reflectance of at most {max(tops):.3g} in every band",
-            f"more than {DIM_BRIGHTEST:g} in the brightest over vegetation",
-            "Check `scale` of the plot.",
-        )
-    ]
+    make = findings.error if top < DARKEST_BRIGHTEST else findings.warning
+    too_dim = make(
+        path,
+        f"reflectance of at most {top:.3g} in every band",
+        f"more than {DIM_BRIGHTEST:g} in the brightest: leaves reflect a third of near infrared",
+        "Check `scale` of the plot: the images look divided by too much.",
+    )
+    findings.stop([too_dim])
+    return [too_dim]
 
 
 def check_order(path: Path, values: np.ndarray, camera: Sequence[CameraBand]) -> None:

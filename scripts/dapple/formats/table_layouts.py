@@ -2,7 +2,7 @@
 
 Campbell TOA5 and TOACI1, Onset HOBO, DWD's ten-minute and hourly radiation, BSRN (PANGAEA's text
 and the station-to-archive file), NSRDB, PVGIS (hourly, typical year), FLUXNET, CAMS, Solcast,
-Open-Meteo; and those of `station_layouts`.
+Open-Meteo; and those of `station_layouts`, `logger_layouts` and `reanalysis_layouts`.
 """
 
 import re
@@ -16,6 +16,8 @@ import pandas as pd
 
 from dapple.errors import InputError
 from dapple.formats import table_numbers
+from dapple.formats.logger_layouts import davis, meter
+from dapple.formats.reanalysis_layouts import era5, power
 from dapple.formats.station_layouts import knmi, midc, surfrad
 from dapple.formats.text_table import JOINED_TIME, Table, build, there
 
@@ -338,4 +340,8 @@ LAYOUTS: tuple[Callable[[Path, Sequence[str]], Table | None], ...] = (
     knmi,
     surfrad,
     midc,
+    meter,
+    davis,
+    power,
+    era5,
 )

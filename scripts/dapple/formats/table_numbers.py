@@ -72,11 +72,11 @@ def decimal_sign(cells: pd.DataFrame, column: str, where: str) -> str:
         others = {sign for name in cells if name != column for sign in _shown(cells[name])[0]}
         shown = dict.fromkeys(others, "") if len(others) == 1 else {}
     # 998, 999, 1,000: a comma only where a thousand is full.
-    if shown or not unclear or 0 < largest < 1000:
+    if shown or not unclear or ("," in unclear and 0 < largest < 1000):
         return next(iter(shown), ".")
     raise InputError(
         where,
-        f"{unclear}, which may be {unclear.replace(',', '.')} or {unclear.replace(',', '')}",
+        f"{unclear}, which may be {unclear.replace(',', '.')} or {re.sub('[.,]', '', unclear)}",
         "numbers whose decimal sign can be told",
         'Set `decimal` for this table to "." or ",".',
     )
@@ -85,7 +85,7 @@ def decimal_sign(cells: pd.DataFrame, column: str, where: str) -> str:
 def _shown(column: pd.Series) -> tuple[dict[str, str], str, int]:
     """Decimal signs by the numbers that show them, a number like 1,234, the largest without."""
     shown: dict[str, str] = {}
-    unclear, largest = "", 0
+    unclear, with_point, largest = "", "", 0
     for text in column.unique():
         match = NUMBER.match(_joined(str(text)))
         if not match:
@@ -97,6 +97,11 @@ def _shown(column: pd.Series) -> tuple[dict[str, str], str, int]:
             shown.setdefault(sign, number)
         elif "," in number:
             unclear = unclear or number
+        else:
+            with_point = with_point or number
+    # 998, 999, 1.000: points of thousands; 0, 5, 1.250: a decimal point.
+    if with_point and not shown and 100 <= largest < 1000:
+        unclear = unclear or with_point
     return shown, unclear, largest
 
 

@@ -1,6 +1,7 @@
 """A table whose cells are text, and how lines of a file become one."""
 
 import csv
+import re
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,6 +16,8 @@ from dapple.formats.table_numbers import Numbers
 
 JOINED_TIME = "time"
 """Column that is made of a layout's columns of year, month, day, hour and minute."""
+LONGER_THAN_UNITS = 7
+"""Words of so many letters that are no known unit are remarks: corrected, station."""
 MOST_NAMED = 4
 """Of many usual names, messages list so many."""
 
@@ -159,7 +162,8 @@ def build(
     **facts
         Further attributes of the table.
     """
-    names, in_header, repeated = _names(cells_of(lines[header].lstrip("# "), delimiter))
+    heads = cells_of(lines[header].lstrip("# "), delimiter)
+    names, in_header, repeated = _names(heads)
     first = header + 1 if first is None else first
     rows, numbers = [], []
     for number, line in enumerate(lines[first:], start=first + 1):
@@ -170,6 +174,8 @@ def build(
             continue
         while len(row) > len(names) and not row[-1]:
             row.pop()
+        if row == heads:
+            continue  # files that were put behind one another
         if len(row) != len(names):
             raise uneven(path, number, line, len(row), len(names))
         rows.append(row)
@@ -224,10 +230,24 @@ def _names(row: list[str]) -> tuple[list[str], dict[str, str], frozenset[str]]:
     return names, {name: unit for name, unit in found.items() if unit}, repeated
 
 
+def _is_remark(text: str) -> bool:
+    """Whether what stands in brackets is no unit: a number, a duration, words."""
+    words = re.findall(r"[^\W\d_]+", text)
+    is_duration = re.fullmatch(r"\d+\s*(?:s|min|mins|minutes?|h|hr|hours?|t)?", text)
+    is_prose = bool(words) and re.fullmatch(r"[^\W\d_]+(?:[\s,.-]+[^\W\d_]+)*\.?", text)
+    is_word = is_prose and max(map(len, words)) >= LONGER_THAN_UNITS and not units.is_unit(text)
+    return bool(is_duration or is_word)
+
+
 def _unit_of(name: str) -> str:
     """The unit in the name of a column: in brackets, or known and behind a comma or a dash."""
+    serial = column_names.SERIAL.search(name)
+    if serial and serial["unit"]:
+        return serial["unit"].strip()
     name = column_names.SERIAL.sub("", name)
+    if match := column_names.UNIT_BEFORE.match(name):
+        return match["unit"]
     if match := column_names.UNIT_IN_HEADER.match(name):
-        return "" if match["unit"].strip().isdigit() else match["unit"].strip()
+        return "" if _is_remark(match["unit"].strip()) else match["unit"].strip()
     match = column_names.UNIT_AT_END.match(name)
     return match["unit"] if match and units.named(match["unit"]) else ""

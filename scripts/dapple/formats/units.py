@@ -9,25 +9,41 @@ from dapple.findings import Finding
 
 SUNLIGHT_UMOL_PER_J = 4.57
 """Photons of 400 to 700 nm in a joule of sunlight of that range (Thimijan and Heins 1983)."""
+DAYLIGHT_LX_PER_UMOL = 54.0
+"""Lux in a µmol m⁻² s⁻¹ of daylight of 400 to 700 nm (Thimijan and Heins 1983)."""
+DAYLIGHT_LM_PER_W = 110.0
+"""Lumen in a watt of global radiation: 105 to 115 in most weather (Littlefair 1985)."""
 
-POWERS = {"W/m2": 1.0, "kW/m2": 1e3, "mW/cm2": 10.0, "cal/cm2/min": 4.184e4 / 60}
+POWERS = {"W/m2": 1.0, "kW/m2": 1e3, "mW/cm2": 10.0, "cal/cm2/min": 4.184e4 / 60,
+          "kJ/m2/h": 1e3 / 3600, "MJ/m2/h": 1e6 / 3600, "J/cm2/h": 1e4 / 3600,
+          "kJ/m2/min": 1e3 / 60, "MJ/m2/d": 1e6 / 86_400,
+          "lx": 1 / DAYLIGHT_LM_PER_W, "klx": 1e3 / DAYLIGHT_LM_PER_W}  # fmt: skip
 """Irradiance in W m⁻²."""
 ENERGIES = {"J/m2": 1.0, "kJ/m2": 1e3, "MJ/m2": 1e6, "J/cm2": 1e4, "Wh/m2": 3.6e3, "kWh/m2": 3.6e6,
             "cal/cm2": 4.184e4}  # fmt: skip
 """Sums over an interval, in J m⁻²."""
 PHOTONS = {"umol/m2/s": 1.0, "mmol/m2/s": 1e3, "mol/m2/d": 1e6 / 86_400,
-           "W/m2": SUNLIGHT_UMOL_PER_J}  # fmt: skip
+           "W/m2": SUNLIGHT_UMOL_PER_J,
+           "lx": 1 / DAYLIGHT_LX_PER_UMOL, "klx": 1e3 / DAYLIGHT_LX_PER_UMOL}  # fmt: skip
 """Photon flux of 400 to 700 nm in µmol m⁻² s⁻¹; W/m2: of PAR."""
 PHOTON_SUMS = {"mol/m2": 1e6, "mmol/m2": 1e3}
 """Sums over an interval, in µmol m⁻²."""
 
-IRRADIANCES = (*POWERS, *ENERGIES)
-PHOTON_FLUXES = (*PHOTONS, *PHOTON_SUMS)
+ILLUMINANCES = ("lx", "klx")
+"""What the eye sees: only where somebody declares it, for it holds for daylight alone."""
+IRRADIANCES = tuple(unit for unit in (*POWERS, *ENERGIES) if unit not in ILLUMINANCES)
+PHOTON_FLUXES = tuple(unit for unit in (*PHOTONS, *PHOTON_SUMS) if unit not in ILLUMINANCES)
 
 # After `_squeezed`: powers, signs and blanks away.
 SPELLINGS = {
     "W/m2": ("wm2", "watt", "watts", "w", "wattm2", "wattsm2", "wsqm", "wattspersquaremeter",
-             "wattspersquaremetre", "wattpersquaremeter", "wattpersquaremetre"),
+             "wattspersquaremetre", "wattpersquaremeter", "wattpersquaremetre", "wqm", "wattqm",
+             "jm2s", "jm2s1", "jsm2", "js1m2"),
+    "kJ/m2/h": ("kjm2h", "kjm2h1", "kjm2hr", "kjm2hr1", "kjhm2"),
+    "MJ/m2/h": ("mjm2h", "mjm2h1", "mjm2hr", "mjm2hr1", "mjhm2"),
+    "J/cm2/h": ("jcm2h", "jcm2h1", "jcm2hr"),
+    "kJ/m2/min": ("kjm2min", "kjm2min1"),
+    "MJ/m2/d": ("mjm2d", "mjm2d1", "mjm2day", "mjm2day1"),
     "kW/m2": ("kwm2", "kw"),
     "mW/cm2": ("mwcm2",),
     "J/m2": ("jm2",),
@@ -45,16 +61,21 @@ SPELLINGS = {
     "cal/cm2": ("calcm2", "ly", "langley", "langleys"),
     "cal/cm2/min": ("calcm2min", "calcm2min1", "lymin", "lymin1", "langleymin"),
     "mol/m2": ("molm2", "mol"),
+    "lx": ("lx", "lux"),
+    "klx": ("klx", "klux"),
     "mmol/m2": ("mmolm2",),
 }  # fmt: skip
 KNOWN = {spelling: unit for unit, spellings in SPELLINGS.items() for spelling in spellings}
 OTHER_UNITS = {"nm", "um", "m", "mm", "cm", "s", "min", "h", "degc", "c", "%", "ts", "rn", "v",
-               "mv", "volts", "deg", "utc", "hpa", "lux", "lx", "klx"}  # fmt: skip
+               "mv", "volts", "deg", "utc", "hpa", "einstein", "einsteins",
+               "candela", "candelas", "footcandle", "footcandles", "millivolt", "millivolts",
+               "counts", "kilojoules", "megajoules"}  # fmt: skip
 
 
 ILLUMINANCE = (
-    " Light as the eye sees it tells radiation under one kind of light alone: of daylight 1000 lx "
-    "are about 18.5 µmol m⁻² s⁻¹ of PAR (Thimijan and Heins 1983)."
+    "Light as the eye sees it tells radiation under one kind of light alone: `{key}: {unit}` takes "
+    f"it for daylight, of which 1000 lx are {1e3 / DAYLIGHT_LX_PER_UMOL:.3g} µmol m⁻² s⁻¹ of PAR "
+    f"(Thimijan and Heins 1983) and {1e3 / DAYLIGHT_LM_PER_W:.2g} W m⁻² (Littlefair 1985)."
 )
 
 
@@ -118,12 +139,14 @@ def of_column(
         )
         return declared, [doubt] if found and found != declared else []
     if (in_file and found is None) or (found and found not in known):
+        is_for_eyes = found in ILLUMINANCES
         raise InputError(
             where,
             f"the unit '{in_file or found}'",
             f"one of {', '.join(known)}",
-            f"Declare it as `{key}`, or convert the values."
-            + (ILLUMINANCE if _squeezed(in_file) in ("lux", "lx", "klx", "klux") else ""),
+            ILLUMINANCE.format(key=key, unit=found)
+            if is_for_eyes
+            else f"Declare it as `{key}`, or convert the values.",
         )
     return found or "", []
 

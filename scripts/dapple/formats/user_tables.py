@@ -12,10 +12,17 @@ from dapple.formats.text_table import Table, build, cells_of, trimmed, uneven
 from dapple.formats.units import is_unit
 
 DELIMITERS = ";\t,|"
-LIGHT_FLAGS = (-99.0, -99.9, -99.99, -888.0, -999.0, -999.9, -999.99, -6999.0, -7999.0, -8888.0,
-               -9999.0, -9999.9, -99999.0, -32768.0, 6999.0, 7999.0, 9999.0, 99999.0,
-               1e20, 1e30)  # fmt: skip
+LIGHT_FLAGS = (
+    *(-99.0, -99.9, -99.99, -888.0, -999.0, -999.9, -999.99, -6999.0, -7999.0, -8888.0),
+    *(sign * (10.0**digits - rest) for sign in (-1, 1) for digits in (4, 5, 6, 7)
+      for rest in (1.0, 0.1, 0.01)),
+    *(6999.0, 7999.0, -32768.0, -32767.0, 32767.0, 65535.0, -9999000.0, 1e20, 1e30),
+)  # fmt: skip
 """Numbers by which loggers and services mark missing light: none is a light."""
+
+QUOTED = re.compile(r'"[^"]*"')
+HEAD_LINES, MOST_BREAKS = 40, 4
+"""Lines at the beginning, and breaks in one quoted cell of them."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +98,18 @@ def read_lines(path: Path) -> list[str]:
     text = _decoded(data)
     if "\x00" in text:
         raise InputError(path, "a binary file", "a text table", "Export it as CSV.")
-    return re.split(r"\r\n|\r|\n", text.removesuffix("\n"))
+    return _whole_cells(re.split(r"\r\n|\r|\n", text.removesuffix("\n")))
+
+
+def _whole_cells(lines: list[str]) -> list[str]:
+    """Cells of a header that go on in the next line put together; numbers of lines are kept."""
+    for index in range(min(len(lines), HEAD_LINES)):
+        last = index
+        while lines[index].count('"') % 2 and last - index < MOST_BREAKS and last + 1 < len(lines):
+            last += 1
+            lines[index] += " " + lines[last]
+            lines[last] = ""
+    return lines
 
 
 def _decoded(data: bytes) -> str:
@@ -174,7 +192,9 @@ def _layout(path: Path, lines: Sequence[str]) -> tuple[str, int]:
     sample = filled[:200]
     best = (1, -1, "", filled[0])
     for rank, delimiter in enumerate([*DELIMITERS, " "]):
-        counts = [len(trimmed(cells_of(lines[index], delimiter))) for index in sample]
+        bare = [QUOTED.sub("quoted", lines[index]) if delimiter != " " else lines[index]
+                for index in sample]  # fmt: skip
+        counts = [len(trimmed(cells_of(line, delimiter))) for line in bare]
         usual, votes = Counter(counts).most_common(1)[0]
         if usual < 2 or votes < 0.5 * len(counts):
             continue

@@ -1,6 +1,6 @@
 """Can a radiation table be right? Its unit, its columns and single rows, against physics."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -8,6 +8,7 @@ import pvlib
 
 from dapple import findings
 from dapple.findings import Finding
+from dapple.formats import units
 from dapple.sky import radiation_clock
 from dapple.sky.radiation_table import Radiation
 from dapple.sky.sun import Site, clear_sky, extraterrestrial, position
@@ -86,13 +87,21 @@ def check(
     energy, so that short cloud edges and offsets of sensors at night raise no doubt.
     """
     rows = beside_clear_sky(radiation, site, linke_turbidity)
+    off = radiation_clock.offset(radiation, site, linke_turbidity=linke_turbidity)
+    wrong_time = radiation_clock.check(radiation, site, off)
+    if off is not None and wrong_time is not None and wrong_time.level == "error":
+        # Units are judged as if the clock were right: a day that is cut in two is no bright day.
+        moved = radiation.table.set_axis(
+            radiation.table.index + pd.Timedelta(minutes=off.minutes), axis="index"
+        )
+        rows = beside_clear_sky(replace(radiation, table=moved), site, linke_turbidity)
     if (exchanged := _exchanged(radiation, rows)) is not None:
         return [exchanged]
     doubts = [
         one
         for one in (
             _unit(radiation, rows),
-            radiation_clock.check(radiation, site, linke_turbidity=linke_turbidity),
+            wrong_time,
             _diffuse(radiation, rows),
         )
         if one is not None
@@ -150,6 +159,7 @@ def unit_factors(step_min: float) -> dict[str, float]:
         "kW/m2": 1e-3,
         "mW/cm2": 0.1,
         "umol/m2/s": PAR_UMOL_PER_GLOBAL_J,
+        "lx": units.DAYLIGHT_LM_PER_W,
     }
     return {
         unit: factor
@@ -190,7 +200,7 @@ def _unit(radiation: Radiation, rows: Rows) -> Finding | None:
         remedy = "Check unit, calibration, place and date."
     else:
         others = f" (or {' or '.join(likely[1:3])})" if len(likely) > 1 else ""
-        over = "" if likely[0] in ("kW/m2", "mW/cm2", "umol/m2/s") else f" over {step:g} min"
+        over = "" if likely[0] in ("kW/m2", "mW/cm2", "umol/m2/s", "lx") else f" over {step:g} min"
         remedy = f"This fits {likely[0]}{over}{others}: set `radiation.unit: {likely[0]}`."
         if likely[0] == "umol/m2/s":
             remedy = (

@@ -1,6 +1,7 @@
 """What a radiation table says of its own clock: a clear sky is symmetric about solar noon."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import pandas as pd
@@ -108,11 +109,8 @@ def _brightest(day: np.ndarray, total: np.ndarray) -> np.ndarray:
     return bright.index.to_numpy()[:MOST_DAYS]
 
 
-def check(
-    radiation: Radiation, site: Site, *, linke_turbidity: float | None = 3.0
-) -> Finding | None:
-    """Name a label or a clock that the light contradicts."""
-    found = offset(radiation, site, linke_turbidity=linke_turbidity)
+def check(radiation: Radiation, site: Site, found: ClockOffset | None) -> Finding | None:
+    """Name a label or a clock that the light contradicts, by the offset that was found."""
     step = radiation.interval_min or radiation.step_min
     if found is None:
         lopsided = _lopsided_days(radiation, site)
@@ -243,6 +241,14 @@ def _solar_noon_ns(day: int, site: Site) -> float:
     return mean_noon - late_min * 60e9
 
 
+@lru_cache(maxsize=256)
+def _clear_sky(first_ns: int, count: int, site: Site, turbidity: float) -> np.ndarray:
+    """Global radiation (count,) of a clear sky every `CURVE_STEP_MIN` [W m⁻²]."""
+    moments = first_ns + (np.arange(count) * CURVE_STEP_MIN * 60e9).astype(np.int64)
+    times = pd.DatetimeIndex(pd.to_datetime(moments, utc=True))
+    return clear_sky(times, site, linke_turbidity=turbidity)["global_w_m2"].to_numpy()
+
+
 class _Curves:
     """A clear day at two turbidities, averaged over any interval of it."""
 
@@ -250,11 +256,10 @@ class _Curves:
         half = 12 * 60 + REACH_MIN + 120
         self.minutes = np.arange(-half, half + 1, CURVE_STEP_MIN)
         self.noon_ns = noon_ns
-        moments = (noon_ns + self.minutes * 60e9).astype(np.int64)
-        times = pd.DatetimeIndex(pd.to_datetime(moments, utc=True))
         hazy = 3.0 if linke_turbidity is None else linke_turbidity
+        first_ns = int(noon_ns + self.minutes[0] * 60e9)
         self.curves = [
-            clear_sky(times, site, linke_turbidity=turbidity)["global_w_m2"].to_numpy()
+            _clear_sky(first_ns, len(self.minutes), site, turbidity)
             for turbidity in (max(hazy - 1.0, 1.5), hazy + 2.0)
         ]
 

@@ -86,7 +86,7 @@ def broadband(
     if kind == "clear_sky":
         clear = clear_sky(times, site, linke_turbidity=linke_turbidity)
         return Series(clear, facts={"kind": kind})
-    measured = near(read(path, **table), times)  # type: ignore[arg-type]
+    measured = near(read(path, site=site, **table), times)  # type: ignore[arg-type]
     noticed = list(measured.findings)
     doubts = plausible.check(measured, site, linke_turbidity=linke_turbidity)
     if implausible == "refuse":

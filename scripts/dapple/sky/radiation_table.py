@@ -14,6 +14,8 @@ from dapple.findings import Finding
 from dapple.formats import column_names, time_columns, units, user_tables
 from dapple.formats.text_table import Table
 from dapple.formats.user_tables import Declared
+from dapple.sky import direct_beam
+from dapple.sky.sun import Site
 from dapple.times import AHEAD, parse
 
 MAX_STEP_MIN = 180.0
@@ -68,7 +70,14 @@ class Radiation:
 
 
 def read(
-    path: str | Path, *, global_column: str = "", diffuse_column: str = "", **declared: Any
+    path: str | Path,
+    *,
+    site: Site | None = None,
+    global_column: str = "",
+    diffuse_column: str = "",
+    direct_column: str = "",
+    direct_plane: str = "",
+    **declared: Any,
 ) -> Radiation:
     """Read measured broadband radiation.
 
@@ -76,9 +85,14 @@ def read(
     ----------
     path : path
         A text table in any layout of `dapple.formats.user_tables`.
+    site : Site or None
+        Where the sun is looked up if direct radiation faces it.
     global_column, diffuse_column : str
         Global and diffuse irradiance on the horizontal; empty: found by the usual names or the
         file's layout. Diffuse may be absent.
+    direct_column, direct_plane : str
+        Direct radiation, facing the sun (`normal`) or on the horizontal; used where global or
+        diffuse is absent.
     **declared
         Fields of `user_tables.Declared`; `unit` is of both (`units.POWERS`, `units.ENERGIES`),
         else W/m2.
@@ -86,8 +100,8 @@ def read(
     Raises
     ------
     InputError
-        No file or column, unreadable times, two values at one time, text that is no number, sums
-        over an unknown interval, or nothing left.
+        No file or column, direct radiation on an unknown plane, unreadable times, two values at one
+        time, text that is no number, sums over an unknown interval, or nothing left.
     """
     said = Declared(**declared)
     source = user_tables.read(path, decimal=said.decimal)
@@ -95,17 +109,13 @@ def read(
     stated = source.timezone or times.zone
     zone = said.timezone or stated
     index = parse(times.text, path, zone, time_format=said.time_format)
-    names = {
-        "global_w_m2": _column(
-            source, global_column, "global", column_names.GLOBAL, "radiation.global_column"
-        ),
-        "diffuse_w_m2": _diffuse_column(source, diffuse_column),
-    }
-    columns = {kind: name for kind, name in names.items() if name}
+    columns, plane = _columns(source, global_column, diffuse_column, direct_column, direct_plane)
     numbers = {kind: source.numbers(name, said.flags) for kind, name in columns.items()}
     table = pd.DataFrame({kind: one.values for kind, one in numbers.items()}, index=index)
     dropped = {columns[kind]: one.missing for kind, one in numbers.items() if one.missing}
-    table = table[table["global_w_m2"].notna()]
+    table = table.dropna(how="all")
+    if "direct_w_m2" not in table:
+        table = table[table["global_w_m2"].notna()]
     if table.empty:
         raise InputError(path, "no row with a value", "radiation by time", "Is the file complete?")
     repeated = int(table.index.duplicated().sum())
@@ -125,8 +135,23 @@ def read(
             known=units.IRRADIANCES,
         )
         noticed += doubt
-        step = length_min or said.interval_min or _step_min(table)
+        step = length_min or said.interval_min or source.interval_min or _step_min(table)
         table[kind] *= units.irradiance_factor(used[kind] or "W/m2", step, where)
+        if used[kind] in units.ILLUMINANCES:
+            noticed.append(
+                findings.warning(
+                    where, "illuminance", "W m⁻²",
+                    f"Taken for daylight, {units.DAYLIGHT_LM_PER_W:g} lx in a W m⁻²: within about "
+                    "a tenth.",
+                )
+            )  # fmt: skip
+    if plane:
+        half = 0.5 * length_min * 60e9
+        middle = table.index.asi8 + AHEAD[label] * length_min * 60e9
+        table, text = direct_beam.complete(
+            table, np.stack([middle - half, middle + half]), plane, site, str(path)
+        )
+        noticed.append(findings.note(path, text))
     noticed += [
         findings.note(
             path, f"{sum(flags.values())} values of {name} missing ({user_tables.counted(flags)})"
@@ -161,17 +186,40 @@ def read(
     return Radiation(table, length_min, label, is_declared, str(path), tuple(noticed), facts)
 
 
-def _column(source: Table, name: str, role: str, usual: Sequence[str], key: str) -> str:
-    """The declared column, that of the layout, or the one with a usual name."""
-    if name:
-        return source.require([name], key)
-    return source.known.get(role) or source.require(usual, key)
+def _columns(
+    source: Table, total: str, diffuse: str, direct: str, plane: str
+) -> tuple[dict[str, str], str]:
+    """Columns by quantity, and the plane of direct radiation; "" where it is not used."""
+    found = {
+        "global_w_m2": _column(source, total, "global", column_names.GLOBAL),
+        "diffuse_w_m2": _column(source, diffuse, "diffuse", column_names.DIFFUSE),
+    }
+    columns = {kind: name for kind, name in found.items() if name}
+    beam, plane = direct_beam.column(source, direct, plane)
+    has_both = len(columns) == 2
+    if beam is None or (has_both and not direct):
+        if "global_w_m2" not in columns:
+            source.require(column_names.GLOBAL, "radiation.global_column")
+        return columns, ""
+    if not columns:
+        source.require(column_names.GLOBAL, "radiation.global_column")
+    if not plane and "global_w_m2" in columns and not direct:
+        return columns, ""  # global radiation is enough, and nobody says what the beam falls on
+    if not plane:
+        raise InputError(
+            source.path,
+            f"direct radiation ({beam}), and not on which plane it was measured",
+            "`radiation.direct_plane: normal` (facing the sun) or `horizontal`",
+            "Set it as the station's description says.",
+        )
+    return columns | {"direct_w_m2": beam}, plane
 
 
-def _diffuse_column(source: Table, name: str) -> str | None:
+def _column(source: Table, name: str, role: str, usual: Sequence[str]) -> str | None:
+    """The declared column, that of the layout, the one with a usual name, or None."""
     if name:
-        return source.require([name], "radiation.diffuse_column")
-    return source.known.get("diffuse") or source.find(column_names.DIFFUSE)
+        return source.require([name], f"radiation.{role}_column")
+    return source.known.get(role) or source.find(usual)
 
 
 def _interval(

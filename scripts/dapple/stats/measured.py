@@ -267,6 +267,15 @@ def _in_micromoles(
                                  f"Taken as {units.SUNLIGHT_UMOL_PER_J} µmol J⁻¹, which holds for "
                                  "sunlight.")
             )  # fmt: skip
+        if unit in units.ILLUMINANCES:
+            noticed.append(
+                findings.warning(
+                    where, "illuminance", "µmol m⁻² s⁻¹ of PAR",
+                    f"Taken for daylight, {units.DAYLIGHT_LX_PER_UMOL:g} lx in a µmol m⁻² s⁻¹. "
+                    "Light that passed through leaves has about twice as many, so deep shade looks "
+                    "up to twice as bright as it is.",
+                )
+            )  # fmt: skip
         length = said.interval_min or source.interval_min
         long.loc[long["column"] == column, "par_umol_m2_s"] *= units.photon_factor(
             unit or "umol/m2/s", length, where

@@ -5,12 +5,13 @@ import pandas as pd
 
 from dapple import findings
 from dapple.findings import Finding
+from dapple.formats import units
 
 OTHER_UNITS = {
     "mmol/m2/s": 1e-3,
-    "W/m2": 1 / 4.57,
-    "klx": 0.0185,
-    "lx": 18.5,
+    "W/m2": 1 / units.SUNLIGHT_UMOL_PER_J,
+    "klx": 1e-3 * units.DAYLIGHT_LX_PER_UMOL,
+    "lx": units.DAYLIGHT_LX_PER_UMOL,
     "W/m2 of global radiation": 1 / 2.06,
 }
 """What 1 µmol m⁻² s⁻¹ of sunlit PAR is in units in which it is written now and then."""
