@@ -176,17 +176,23 @@ def main() -> None:
         "--shots", type=int, nargs="*", default=[2_500_000, 5_000_000, 10_000_000]
     )
     arguments.add_argument("--output", type=Path)
-    arguments.add_argument("--folder", type=Path, help="for files on the way; they are removed")
+    arguments.add_argument("--stages", nargs="*", default=[*STAGES, "voxels"])
+    arguments.add_argument("--folder", type=Path, help="keeps files on the way, to go on from them")
     options = arguments.parse_args()
     rows = []
     for made, stages, sizes in (
         (make, STAGES, options.points),
         (crown, {"voxels": voxels}, options.shots),
     ):
-        for n in sizes:
-            with tempfile.TemporaryDirectory(dir=options.folder) as folder:
-                measured(made, Path(folder), n)
-                for name, stage in stages.items():
+        asked = {name: stage for name, stage in stages.items() if name in options.stages}
+        for n in sizes if asked else ():
+            with tempfile.TemporaryDirectory() as passing:
+                folder = options.folder / f"{made.__name__}_{n}" if options.folder else passing
+                if not Path(folder, "made").exists():
+                    Path(folder).mkdir(parents=True, exist_ok=True)
+                    measured(made, Path(folder), n)
+                    Path(folder, "made").touch()
+                for name, stage in asked.items():
                     rows.append({"stage": name, "size": n} | measured(stage, Path(folder), n))
                     print(rows[-1], flush=True)
                     _keep(rows, options.output)

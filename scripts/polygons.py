@@ -21,6 +21,7 @@ def main(snakemake):
     truth = json.read(snakemake.input.truth) if snakemake.input.truth else None
     facts = summary.of_meshes(leaves, made["wood"], truth)
     facts["n_added"] = leaves.n_elements - made["leaf"].n_elements
+    del leaves, made  # of a large cloud, the bracket has no room beside them
     if is_bracketed:
         leaf_m = cloud.xyz_m[cloud.attributes["Classification"] == clouds.LEAF]
         used = polygon_sizes.resolved(leaf_m, settings)

@@ -10,7 +10,7 @@ import pytest
 from dapple.cloud import selection, voxel_groups
 from dapple.cloud.classify import majority
 from dapple.cloud.clean import thin
-from dapple.formats import cloud_las, clouds, ground_surface, meshes
+from dapple.formats import cloud_las, clouds, ground_surface, meshes, ply
 from dapple.formats.clouds import Cloud
 from dapple.formats.ground_surface import GroundSurface
 from dapple.formats.shots import Shots
@@ -90,6 +90,21 @@ def test_memory_does_not_grow_with_the_cloud_but_with_a_slab(monkeypatch):
     whole = peak(areas)
     monkeypatch.setattr(voxel_groups, "MOST_POINTS", len(XYZ) // 20)
     assert peak(areas) < 0.4 * whole
+
+
+def test_meshes_are_put_together_and_measured_without_a_second_one_in_memory(monkeypatch, tmp_path):
+    part = polygons.reconstruct(XYZ[:20_000], voxel_size_m=0.1, seed=1)
+    size = 20 * sum(one.nbytes for one in (part.vertices_m, part.faces, part.element))
+    for module in (meshes, ply):
+        monkeypatch.setattr(module, "PIECE", 1_000)
+
+    parts = [part] * 20
+    whole = meshes.concatenate(parts)
+    assert not parts  # each went when it had been copied
+    assert whole.n_elements == 20 * part.n_elements
+    assert whole.area_m2 == pytest.approx(20 * part.area_m2)
+    assert peak(lambda: whole.area_m2) < 0.5 * size
+    assert peak(lambda: meshes.write_ply(tmp_path / "whole.ply", whole)) < 0.1 * size
 
 
 def test_a_large_file_is_written_in_pieces_of_the_same_bytes(monkeypatch, tmp_path):

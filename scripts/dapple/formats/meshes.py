@@ -39,15 +39,22 @@ class Mesh:
         """(t, 3) normals whose length is twice the triangle's area [m²]."""
         normal = np.empty((len(self.faces), 3))
         for at in range(0, len(self.faces), PIECE):
-            faces = self.faces[at : at + PIECE]
-            a, b, c = (self.vertices_m[faces[:, k]] for k in range(3))
-            normal[at : at + PIECE] = np.cross(b - a, c - a)
+            normal[at : at + PIECE] = self._normals(at)
         return normal
+
+    def _normals(self, at: int) -> np.ndarray:
+        """`triangle_normal` of a piece."""
+        faces = self.faces[at : at + PIECE]
+        a, b, c = (self.vertices_m[faces[:, k]] for k in range(3))
+        return np.cross(b - a, c - a)
 
     @property
     def triangle_area_m2(self) -> np.ndarray:
         """(t,) one-sided areas [m²]."""
-        return 0.5 * np.linalg.norm(self.triangle_normal, axis=1)
+        area_m2 = np.empty(len(self.faces))
+        for at in range(0, len(self.faces), PIECE):
+            area_m2[at : at + PIECE] = 0.5 * np.linalg.norm(self._normals(at), axis=1)
+        return area_m2
 
     @property
     def element_area_m2(self) -> np.ndarray:
@@ -120,18 +127,24 @@ def of_discs(discs: np.ndarray, n_sides: int = 12) -> Mesh:
 
 
 def concatenate(meshes: list[Mesh]) -> Mesh:
-    """Put meshes together; elements keep their order and are renumbered."""
-    vertex_shift = np.cumsum([0] + [len(mesh.vertices_m) for mesh in meshes])
-    element_shift = np.cumsum([0] + [mesh.n_elements for mesh in meshes])
-    return Mesh(
-        np.concatenate([mesh.vertices_m for mesh in meshes]).reshape(-1, 3),
-        np.concatenate([m.faces + s for m, s in zip(meshes, vertex_shift[:-1], strict=True)])
-        .reshape(-1, 3)
-        .astype(np.int32),
-        np.concatenate(
-            [m.element + s for m, s in zip(meshes, element_shift[:-1], strict=True)]
-        ).astype(np.int32),
-    )
+    """Put meshes together; elements keep their order and are renumbered.
+
+    The list is emptied on the way: of large meshes, memory holds none twice.
+    """
+    vertices_m = np.empty((sum(len(mesh.vertices_m) for mesh in meshes), 3))
+    faces = np.empty((sum(len(mesh.faces) for mesh in meshes), 3), np.int32)
+    element = np.empty(len(faces), np.int32)
+    n_vertices = n_faces = n_elements = 0
+    while meshes:
+        mesh = meshes.pop(0)
+        rows = slice(n_faces, n_faces + len(mesh.faces))
+        vertices_m[n_vertices : n_vertices + len(mesh.vertices_m)] = mesh.vertices_m
+        np.add(mesh.faces, n_vertices, out=faces[rows], casting="same_kind")
+        np.add(mesh.element, n_elements, out=element[rows], casting="same_kind")
+        n_vertices += len(mesh.vertices_m)
+        n_faces += len(mesh.faces)
+        n_elements += mesh.n_elements
+    return Mesh(vertices_m, faces, element)
 
 
 def write_ply(

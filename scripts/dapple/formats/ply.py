@@ -9,6 +9,8 @@ from dapple.formats import ply_elements
 from dapple.formats.atomic import atomic
 
 _FACE = np.dtype([("n", "u1"), ("vertex_indices", "<i4", 3), ("element", "<i4")])
+PIECE = 1_000_000
+"""Faces that are written together."""
 _EXPECTED = "a binary little-endian PLY with vertices and triangles"
 _REMEDY = "Write the mesh again, or convert it (CloudCompare: -M_EXPORT_FMT PLY)."
 
@@ -30,12 +32,14 @@ def write(
         f"element face {len(faces)}\n"
         "property list uchar int vertex_indices\nproperty int element\nend_header\n"
     )
-    table = np.empty(len(faces), _FACE)
-    table["n"], table["vertex_indices"], table["element"] = 3, faces, element
     with atomic(path) as partial, partial.open("wb") as file:
         file.write(header.encode("ascii"))
         np.ascontiguousarray(vertices, "<f8").tofile(file)
-        table.tofile(file)
+        for at in range(0, len(faces), PIECE):
+            rows = slice(at, at + PIECE)
+            table = np.empty(len(faces[rows]), _FACE)
+            table["n"], table["vertex_indices"], table["element"] = 3, faces[rows], element[rows]
+            table.tofile(file)
 
 
 def read(path: str | Path) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
