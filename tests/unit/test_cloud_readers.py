@@ -232,6 +232,19 @@ def test_an_attribute_that_cannot_be_kept_is_left_out_with_a_note_and_stops_noth
     assert [note.split(" is ")[0] for note in notes] == ["Classification", "ReturnNumber"]
 
 
+@pytest.mark.parametrize("bounds", [[0.0] * 6, [1e30, -1e30] * 3, [-9.0, 9.0] * 3, [np.nan] * 6])
+@pytest.mark.parametrize("corner_m", [(0.0, 0.0, 0.0), (512_345.0, 5_332_918.0, 420.0)])
+def test_bounds_in_a_header_may_be_wrong(tmp_path, bounds, corner_m):
+    corner_m = np.array(corner_m)
+    path = las(tmp_path / "a.las", xyz=XYZ + corner_m, scale=0.01)
+    head = bytearray(path.read_bytes())
+    struct.pack_into("<6d", head, 179, *bounds)
+    path.write_bytes(head)
+    found = clouds.read(path)
+    assert found.world_xyz_m == pytest.approx(XYZ + corner_m, abs=0.006)
+    assert np.abs(found.xyz_m).max() < 1000  # near the local origin
+
+
 # --- E57 ------------------------------------------------------------------------------------
 
 
@@ -316,6 +329,9 @@ AXES = [f"property float {axis}" for axis in "xyz"]
         ),
         ply_text(AXES, "2 0 1\n1 2 3\n4 5 6\n", "element edge 1\nproperty list uchar int v"),
         ply_text(AXES, "1 2 3\n4 5 6\n", "comment made by\nobj_info width 2"),
+        ply_text(AXES, "\n 1  2 3\n\n4 5 6\n"),
+        ply_text([*AXES, "property uint64 id"], "1 2 3 7\n4 5 6 8\n"),
+        ply_text(AXES, "1 2 3\n4 5 6\n").replace("vertex", "points"),
     ],
     ids=[
         "list behind",
@@ -323,6 +339,9 @@ AXES = [f"property float {axis}" for axis in "xyz"]
         "element before",
         "list element before",
         "obj_info",
+        "empty lines",
+        "whole numbers of 64 bits",
+        "vertices called points",
     ],
 )
 def test_lists_and_other_elements_of_a_ply_are_passed_over(tmp_path, text):
@@ -409,6 +428,15 @@ def test_a_cloud_with_normals_and_colours_is_no_ray_cloud(tmp_path):
         ("X,Y,Z,\n1,2,3,\n4,5,6,\n", []),
         ("X Y Z Intensity\n1.0 2.0 3.0 NaN\n4 5 6 7\n", ["Intensity"]),
         ("% x y z\n1e0 2e0 3e0\n4 5 6\n", []),
+        ('"Points:0","Points:1","Points:2","Reflectance"\n1,2,3,-4\n4,5,6,-5\n', ["Reflectance"]),
+        ("FID,POINT_X,POINT_Y,POINT_Z\n0,1,2,3\n1,4,5,6\n", ["FID"]),
+        ("coord. X;coord. Y;coord. Z\n1;2;3\n4;5;6\n", []),
+        ("xcoord,ycoord,zcoord\n1,2,3\n4,5,6\n", []),
+        ("Nordwert;Ostwert;Höhe\n2,0;1,0;3,0\n5,0;4,0;6,0\n", []),
+        ("east,north,up\n1,2,3\n4,5,6\n", []),
+        ("height,x,y,z\n9,1,2,3\n9,4,5,6\n", ["height"]),
+        ('"X","Y","Z"\n"1,0","2,0","3,0"\n"4,0","5,0","6,0"\n', []),
+        ("x|y|z\n1|2|3\n4|5|6\n", []),
     ],
 )
 def test_text_is_read_as_other_programs_write_it(tmp_path, text, attributes):
@@ -417,6 +445,17 @@ def test_text_is_read_as_other_programs_write_it(tmp_path, text, attributes):
     assert found.xyz_m.tolist() == [[1, 2, 3], [4, 5, 6]]
     expected = ["RelativeIntensity" if a == "Intensity" else a for a in attributes]
     assert list(found.attributes) == expected
+
+
+def test_rows_and_columns_of_a_scan_before_the_coordinates_are_told_from_them(tmp_path):
+    grid = np.argwhere(np.ones((20, 20)))
+    rows = np.column_stack([grid, XYZ, np.arange(400)])
+    np.savetxt(tmp_path / "a.xyz", rows, fmt=["%d", "%d", "%.4f", "%.4f", "%.4f", "%d"])
+    found, source = clouds.read_with_source(tmp_path / "a.xyz")
+    assert found.xyz_m == pytest.approx(XYZ)
+    assert "rows and columns" in source.notes[0]
+    np.savetxt(tmp_path / "b.xyz", rows[:, [2, 3, 4, 0, 1, 5]], fmt="%.4f")
+    assert clouds.read(tmp_path / "b.xyz").xyz_m == pytest.approx(XYZ)
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "latin-1", "utf-8-sig"])

@@ -39,6 +39,8 @@ SAME_DAY = date(2000, 1, 1)
 VLR_USER, VLR_ID = "dapple", 1
 """Names the standard fields that mean something: LAS cannot tell class 0 from never classified."""
 
+FAR = 100.0
+"""Bounds so many times as wide as the first points are spread are no bounds of these points."""
 CHUNK = 1_000_000
 MOST_BYTES = 1 << 26
 """Of a chunk in memory: points may be as long as 65,535 bytes."""
@@ -48,11 +50,12 @@ def read(path: Path) -> RawCloud:
     """Read a whole LAS or LAZ file, chunk by chunk."""
     header = cloud_las_header.read(path)
     named = _declared(header)
-    pieces = [
-        {"xyz": raw.xyz_m}
-        | {n: v for n, v in raw.attributes.items() if not named or n in named or n not in FIELDS}
-        for raw in _chunks(path, header, CHUNK)
-    ]
+    pieces, origin_m = [], np.zeros(3)
+    for raw in _chunks(path, header, CHUNK):
+        fields = raw.attributes.items()
+        used = {n: v for n, v in fields if not named or n in named or n not in FIELDS}
+        pieces.append({"xyz": raw.xyz_m} | used)
+        origin_m = raw.origin_m
     n = sum(len(piece["xyz"]) for piece in pieces)
     crs, units, notes = cloud_crs.describe(header.records)
     step = float(header.scale[:2].max())
@@ -67,7 +70,7 @@ def read(path: Path) -> RawCloud:
         for name, values in attributes.items()
         if named or name not in FIELDS or values.any()
     }
-    return RawCloud(xyz, _origin(header), kept, True, source)
+    return RawCloud(xyz, origin_m, kept, True, source)
 
 
 def iterate(path: Path, chunk: int) -> Iterator[RawCloud]:
@@ -168,11 +171,14 @@ def _chunks(path: Path, header: Header, chunk: int) -> Iterator[RawCloud]:
     kind = laspy.PointFormat(header.point_format)
     if n_extra := header.record_bytes - kind.size:
         kind.add_extra_dimension(laspy.ExtraBytesParams("extra", f"{n_extra}u1"))
-    origin, fields = _origin(header), _extra_fields(header, n_extra)[0]
+    origin, fields = None, _extra_fields(header, n_extra)[0]
     chunk = max(1, min(chunk, MOST_BYTES // header.record_bytes))
     blocks = cloud_laz.blocks if header.compressed else cloud_laz.plain_blocks
     for block in blocks(path, header, chunk):
-        yield _chunk(laspy.PackedPointRecord.from_buffer(block, kind), header, origin, fields)
+        points = laspy.PackedPointRecord.from_buffer(block, kind)
+        if origin is None:
+            origin = _origin(header, points)
+        yield _chunk(points, header, origin, fields)
 
 
 def _extra_fields(header: Header, n_extra: int) -> tuple[list[ExtraField], tuple[str, ...]]:
@@ -185,10 +191,22 @@ def _notes(header: Header) -> tuple[str, ...]:
     return (*header.notes, *_extra_fields(header, n_extra)[1])
 
 
-def _origin(header: Header) -> np.ndarray:
-    """The file's offset, unless coordinates from there are too large for float32."""
-    offset = header.offset + 0.0
+def _origin(header: Header, points: laspy.PackedPointRecord) -> np.ndarray:
+    """The file's offset, unless coordinates from there are too large for float32.
+
+    The bounds in the header tell how large they are. Where the first points (n) lie beyond them, or
+    nowhere near them, they are wrong, and these points tell.
+    """
     corners = np.stack([header.low, header.high])
+    ends = np.array([[points[axis].min(), points[axis].max()] for axis in "XYZ"], float)
+    first = ends.T * header.scale + header.offset
+    slack_m = header.scale
+    within = (first[0] >= corners[0] - slack_m) & (first[1] <= corners[1] + slack_m)
+    span_m = np.ptp(corners, axis=0)
+    absurd = (span_m > frames.FLOAT32_LIMIT_M) & (span_m > FAR * np.ptp(first, axis=0))
+    if not within.all() or absurd.any():
+        corners = first
+    offset = header.offset + 0.0
     if offset.any() and np.abs(corners - offset).max() <= frames.FLOAT32_LIMIT_M:
         return offset
     return frames.choose_origin(corners)

@@ -24,6 +24,10 @@ from dapple.formats.text_layout import Layout
 PTS_COLUMNS = ("X", "Y", "Z", "Intensity", "Red", "Green", "Blue")
 
 
+FEW = 0.1
+"""Of measured coordinates no more than this share are whole numbers."""
+
+
 def read(path: Path) -> RawCloud:
     """Read `X Y Z` and further named columns; without a header the first three are X Y Z.
 
@@ -39,8 +43,13 @@ def read(path: Path) -> RawCloud:
         layout = layout.named(PTS_COLUMNS[: layout.width])
     table = read_table(path, layout)
     table, scan = _without_counts(table)
-    order, factor, degrees = _axes(path, layout)
     notes: list[str] = []
+    if layout.header is None and _begins_with_row_and_column(table):
+        notes.append("The first two columns are taken for rows and columns of the scan.")
+        further = (f"column_{k}" for k in range(6, layout.width + 1))
+        layout = layout.named(("row", "column", *"XYZ", *further))
+        table.columns = pd.Index(layout.names)
+    order, factor, degrees = _axes(path, layout)
     columns = {}
     for name in order:
         columns[name] = _numbers(path, table[name], layout)
@@ -132,13 +141,27 @@ def _without_counts(table: pd.DataFrame) -> tuple[pd.DataFrame, np.ndarray | Non
     return table[~alone], scan[~alone].astype(np.uint16)
 
 
+def _begins_with_row_and_column(table: pd.DataFrame) -> bool:
+    """Whole numbers alone in the first two columns, and none in the three behind them."""
+    if (
+        len(table.columns) < 5
+        or not len(table)
+        or any(table.dtypes.iloc[k].kind == "O" for k in range(5))
+    ):
+        return False
+    first = table.iloc[:, :5].to_numpy(float)
+    whole = (first == np.rint(first)) & (first >= 0)
+    return bool(whole[:, :2].all() and whole[:, 2:].mean(axis=0).max() < FEW)
+
+
 def _axes(path: Path, layout: Layout) -> tuple[list[str], np.ndarray, bool]:
     """Names of the columns of x, y and z, metres of their units, and whether they are degrees."""
     order: list[str] = []
     found = [text_layout.axis(name) for name in layout.names]
     factor, degrees = np.ones(3), False
     for axis in range(3):
-        at, one = next((k, one) for k, one in enumerate(found) if one and one.axis == axis)
+        own = [(k, one) for k, one in enumerate(found) if one and one.axis == axis]
+        at, one = next((pair for pair in own if pair[1].is_letter), own[0])
         order.append(layout.names[at])
         factor[axis], degrees = one.metres, degrees or one.degrees
     return order, factor, degrees

@@ -1,6 +1,7 @@
 """Elements of PLY files: any order, ASCII or binary, with properties that are lists."""
 
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
 
@@ -15,9 +16,13 @@ TYPES = {
     **dict.fromkeys(("ushort", "uint16"), "u2"),
     **dict.fromkeys(("int", "int32"), "i4"),
     **dict.fromkeys(("uint", "uint32"), "u4"),
+    **dict.fromkeys(("long", "int64"), "i8"),
+    **dict.fromkeys(("ulong", "uint64"), "u8"),
     **dict.fromkeys(("float", "float32"), "f4"),
     **dict.fromkeys(("double", "float64"), "f8"),
 }
+VERTICES = {"vertices": "vertex", "point": "vertex", "points": "vertex"}
+"""What some programs call them."""
 FORMS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 LONGEST_LINE = 1 << 16
 
@@ -87,7 +92,7 @@ def read_header(path: Path, handle: BinaryIO) -> Header:
                 case ["comment", "origin_m", *values]:
                     origin = np.array([float(value) for value in values[:3]])
                 case ["element", name, count]:
-                    elements.append((name, int(count), []))
+                    elements.append((VERTICES.get(name, name), int(count), []))
                 case ["property", "list", length, kind, name]:
                     elements[-1][2].append(Property(name, TYPES[kind], TYPES[length]))
                 case ["property", kind, name]:
@@ -215,10 +220,9 @@ def _ascii(path: Path, handle: BinaryIO, element: Element) -> dict[str, np.ndarr
         return {p.name: np.empty(0, p.kind) for p in element.properties if not p.length}
     if element.has_lists:
         return _ascii_row_by_row(path, handle, element)
+    rows = islice((line for line in handle if line.strip()), element.count)
     try:
-        table = np.loadtxt(
-            handle, ndmin=2, max_rows=element.count, usecols=range(len(element.properties))
-        )
+        table = np.loadtxt(rows, ndmin=2, usecols=range(len(element.properties)))
     except ValueError as error:
         raise damaged(path, str(error)) from error
     if len(table) < element.count:

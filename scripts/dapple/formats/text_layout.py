@@ -1,5 +1,6 @@
 """How a text table of points is laid out: encoding, header, separator, decimal sign, units."""
 
+import csv
 import re
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -10,7 +11,7 @@ from dapple.errors import InputError
 HEAD_LINES = 200
 LONGEST_LINE = 1 << 16
 NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?|[-+]?(nan|inf)", re.IGNORECASE)
-MARKS = "/#%!;\"' \t"
+MARKS = "/#%!;' \t"
 """Signs before a header that other programs take for a comment."""
 
 AXES = (
@@ -19,17 +20,22 @@ AXES = (
         "easting",
         "east",
         "e",
-        "xcoordinate",
-        "coordx",
-        "utmx",
         "rechtswert",
+        "ostwert",
+        "ost",
+        "este",
         "longitude",
         "lon",
+        "lng",
     },
-    {"y", "northing", "north", "n", "ycoordinate", "coordy", "utmy", "hochwert", "latitude", "lat"},
-    {"z", "height", "elevation", "altitude", "zcoordinate", "coordz", "utmz", "hoehe", "h"},
+    {"y", "northing", "north", "n", "hochwert", "nordwert", "nord", "norte", "latitude", "lat"},
+    {"z", "h", "height", "elevation", "elev", "altitude", "alt", "hoehe", "up", "cota", "quota"},
 )
-DEGREES = {"longitude", "lon", "latitude", "lat"}
+AXIS_WORDS = re.compile(r"points?|vertex|coordinates?|coords?|koordinate|position|pos|utm|world")
+"""What programs put before or behind the name of an axis: `POINT_X`, `coord. X`, `xcoord`."""
+NUMBERED = re.compile(r"(points|coordinates|xyz|position)\W?([012])")
+"""How ParaView calls parts of vectors: `Points:0`."""
+DEGREES = {"longitude", "lon", "lng", "latitude", "lat"}
 UNITS = {
     "": 1.0,
     "m": 1.0,
@@ -46,11 +52,15 @@ UNITS = {
 
 @dataclass(frozen=True)
 class Axis:
-    """What the name of a column says: x, y or z (0 to 2), metres of its unit, or degrees."""
+    """What the name of a column says: x, y or z (0 to 2), metres of its unit, or degrees.
+
+    Of several columns, one whose name has the letter itself (`is_letter`) is that axis.
+    """
 
     axis: int
     metres: float = 1.0
     degrees: bool = False
+    is_letter: bool = False
 
 
 @dataclass(frozen=True)
@@ -126,11 +136,14 @@ def axis(name: str) -> Axis | None:
         unit, text = re.sub(r"[^a-z°]", "", bracket[1]), text[: bracket.start()]
     elif suffix := re.fullmatch(r"(.*)_(m|cm|mm|ft|feet)", text.strip()):
         text, unit = suffix[1], suffix[2]
+    if part := NUMBERED.fullmatch(text.strip()):
+        return Axis(int(part[2]), UNITS.get(unit, 1.0), is_letter=True)
     letters = re.sub(r"[^a-zö]", "", text).replace("ö", "oe")
+    bare = AXIS_WORDS.sub("", letters)
     for number, known in enumerate(AXES):
-        if letters in known:
+        if letters in known or (len(bare) == 1 and bare in known):
             degrees = letters in DEGREES or unit in ("deg", "degree", "degrees", "°")
-            return Axis(number, UNITS.get(unit, 1.0), degrees)
+            return Axis(number, UNITS.get(unit, 1.0), degrees, bare == "xyz"[number])
     return None
 
 
@@ -158,11 +171,11 @@ def _fields(line: str) -> tuple[str, str, list[str]] | None:
     text = line.strip()
     if not text or _is_count(text):
         return None
-    for separator in (";", "\t", r"\s+", ","):
+    for separator in (";", "\t", "|", r"\s+", ","):
         words = _split(text, separator)
         if len(words) < 3 or not all(NUMBER.fullmatch(word) for word in words[:3]):
             continue
-        comma = separator != "," and any("," in word for word in words[:3])
+        comma = any("," in word for word in words[:3])
         if comma and any("." in word for word in words[:3]):
             continue
         return separator, "," if comma else ".", words
@@ -170,9 +183,15 @@ def _fields(line: str) -> tuple[str, str, list[str]] | None:
 
 
 def _split(text: str, separator: str) -> list[str]:
-    words = text.split() if separator == r"\s+" else text.split(separator)
-    words = [word.strip().strip('"') for word in words]
-    return words
+    if separator == r"\s+":
+        words = text.split()
+    elif '"' in text:  # a separator between quotes is none
+        words = next(
+            csv.reader([text.replace("\r", " ")], delimiter=separator, skipinitialspace=True)
+        )
+    else:
+        words = text.split(separator)
+    return [word.strip().strip('"') for word in words]
 
 
 def _names(
@@ -211,7 +230,7 @@ def _unit_row(fields: list[str]) -> tuple[str, ...]:
 
 def _header_words(path: Path, text: str, separator: str, width: int) -> tuple[str, ...]:
     """Names of a header, which may be separated in another way than the rows."""
-    options = [tuple(_split(text, one)) for one in (separator, ";", ",", "\t", r"\s+")]
+    options = [tuple(_split(text, one)) for one in (separator, ";", ",", "\t", "|", r"\s+")]
     options = [words for words in options if _axes_of(words) == {0, 1, 2}]
     # The way that gives as many names as there are fields, else the first that has the axes.
     fitting = [words for words in options if len(words) == width] or options
@@ -239,7 +258,7 @@ def _axes_of(words) -> set[int]:
 def _has_axes(text: str) -> bool:
     return any(
         _axes_of(re.split(pattern, text.strip().lstrip(MARKS))) == {0, 1, 2}
-        for pattern in (r"[\s,;]+", r"[,;\t]")
+        for pattern in (r"[\s,;|]+", r"[,;\t|]")
     )
 
 
