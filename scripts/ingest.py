@@ -30,6 +30,7 @@ def main(snakemake):
             how=params.shots,
             positions=snakemake.input.positions,
             scan_frame=params.scan_frame,
+            up=params.up,
         )
         facts = {"scans": []}
         pieces = _pieces(fired, facts)

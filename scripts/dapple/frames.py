@@ -77,6 +77,14 @@ def scanner_rotation(roll_deg: float, pitch_deg: float, yaw_deg: float) -> np.nd
     return about_z @ about_y @ about_x
 
 
+def scanner_angles_deg(rotation: np.ndarray) -> tuple[float, float, float]:
+    """Roll, pitch and yaw of which `scanner_rotation` makes a rotation (3, 3) [°]."""
+    roll = np.arctan2(rotation[2, 1], rotation[2, 2])
+    pitch = np.arcsin(np.clip(-rotation[2, 0], -1.0, 1.0))
+    yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
+    return float(np.degrees(roll)), float(np.degrees(pitch)), float(np.degrees(yaw))
+
+
 # --- offsets --------------------------------------------------------------------------------
 
 

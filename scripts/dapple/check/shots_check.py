@@ -10,6 +10,7 @@ import numpy as np
 from dapple import findings
 from dapple.check.cloud_facts import CloudFacts
 from dapple.cloud import ordered, scan_windows, shot_sources
+from dapple.cloud.selection import UP
 from dapple.errors import InputError
 from dapple.findings import Finding
 from dapple.formats import clouds
@@ -50,7 +51,7 @@ def judge(
     found += blind(facts, path)
     state = misses(facts, settings)
     if state == RECORDED and len(facts.source.scans) > 1:
-        found += clipped(facts, path)
+        found += clipped(facts, path, UP[settings["cloud"]["up"]])
     if state == REBUILDABLE and settings["cloud"]["shots"] != "scan_frame":
         found += frames_show(facts, settings, path, positions)
     return found
@@ -125,10 +126,10 @@ def blind(facts: CloudFacts, path: str | Path) -> Iterator[Finding]:
             )
 
 
-def clipped(facts: CloudFacts, path: str | Path) -> Iterator[Finding]:
+def clipped(facts: CloudFacts, path: str | Path, turn: np.ndarray) -> Iterator[Finding]:
     """Shots without return do not cross what other scans show to be dense."""
     try:
-        sums = _sums_of_scans(facts, path)
+        sums = _sums_of_scans(facts, path, turn)
     except InputError:
         return  # said where the shots are read
     for number, share in shares_of_expected(sums).items():
@@ -143,7 +144,7 @@ def clipped(facts: CloudFacts, path: str | Path) -> Iterator[Finding]:
             )
 
 
-def _sums_of_scans(facts: CloudFacts, path: str | Path) -> dict[int, Sums]:
+def _sums_of_scans(facts: CloudFacts, path: str | Path, turn: np.ndarray) -> dict[int, Sums]:
     """What a sample of the shots of every scan leaves in common voxels."""
     xyz = facts.cloud.xyz_m
     some = xyz[:: max(1, len(xyz) // 200_000)]
@@ -154,7 +155,7 @@ def _sums_of_scans(facts: CloudFacts, path: str | Path) -> dict[int, Sums]:
     for number, scan in clouds.ordered_scans(path):
         if len(scan.xyz_m) < LEAST_RETURNS:
             continue
-        thin = thinned(scan, CELLS)
+        thin = thinned(scan, CELLS).in_metres(facts.source.units.horizontal_m, turn)
         shots, _ = ordered.shots_of_grid(thin, number, facts.cloud.origin_m, source=path)
         sums[number] = accumulate(shots, grid, contact_voxel_m=0.0, allow_missing_misses=True)
     return sums

@@ -108,8 +108,9 @@ def clean(
         counts[f"after_{step}"] = _not_empty(int(kept.sum()), step, counts, where)
     rows = np.flatnonzero(kept)
     chosen, versions = outliers.inliers(
-        cloud.xyz_m[rows] if len(rows) < len(cloud) else cloud.xyz_m,
+        cloud.xyz_m,
         outlier_backend,
+        rows=rows if len(rows) < len(cloud) else None,
         neighbours=outlier_neighbours,
         multiplier=outlier_multiplier,
         pdal=pdal,

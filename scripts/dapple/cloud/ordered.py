@@ -18,12 +18,18 @@ from dapple.formats import clouds
 from dapple.formats.ordered_scan import OrderedScan
 from dapple.formats.shots import Shots
 
+UPRIGHT = np.eye(3)
 LEAST_RETURNS = 5
 """Columns and rows with fewer returns do not take part in the fit."""
 
 
 def shots_from_file(
-    path: str | Path, origin_m: np.ndarray, *, lowest_miss_zenith_deg: float = 100.0
+    path: str | Path,
+    origin_m: np.ndarray,
+    *,
+    unit_m: float = 1.0,
+    turn: np.ndarray = UPRIGHT,
+    lowest_miss_zenith_deg: float = 100.0,
 ) -> Iterator[tuple[Shots, dict]]:
     """Shots of a file of ordered scans, scan by scan, those without return included.
 
@@ -32,7 +38,11 @@ def shots_from_file(
     path : str or Path
         PTX or E57.
     origin_m : (3,) array_like
-        World coordinates of the local origin [m], as of `clouds.read(path)`.
+        World coordinates of the local origin [m], as of the cloud.
+    unit_m : float
+        Metres of a unit of the file.
+    turn : (3, 3) array_like
+        Rotation from the axes of the file to east, north, up.
     lowest_miss_zenith_deg : float
         Shots without a return that point further down are left out: something nearer than the
         least range stood in the way.
@@ -53,7 +63,7 @@ def shots_from_file(
     for number, scan in clouds.ordered_scans(path):
         try:
             yield shots_of_grid(
-                scan,
+                scan.in_metres(unit_m, turn),
                 number,
                 np.asarray(origin_m, float),
                 lowest_miss_zenith_deg=lowest_miss_zenith_deg,

@@ -19,6 +19,7 @@ def inliers(
     xyz_m: np.ndarray,
     backend: str,
     *,
+    rows: np.ndarray | None = None,
     neighbours: int = 8,
     multiplier: float = 3.0,
     pdal: str = "pdal",
@@ -32,6 +33,8 @@ def inliers(
         Local frame [m].
     backend : {"cloudcompare", "pdal", "none"}
         Who finds them; `none` keeps all points.
+    rows : (m,) int64 or None
+        Points that count; None: all.
     neighbours : int
         Number of nearest neighbours, the point itself not counted.
     multiplier : float
@@ -43,9 +46,9 @@ def inliers(
     Returns
     -------
     (k,) int64
-        Ascending indices of the points that stay. Points at exactly one place count once, and
-        share what is found of it: neighbours at no distance would make any other place an
-        outlier, and searches among thousands of them do not end.
+        Ascending indices (into `rows` where there are such) of the points that stay. Points at
+        exactly one place count once, and share what is found of it: neighbours at no distance
+        would make any other place an outlier, and searches among thousands of them do not end.
     dict of str to str
         Version of the program used, by its name.
 
@@ -69,9 +72,10 @@ def inliers(
             f"one of {', '.join(BACKENDS)}",
             "Change the configuration.",
         )
-    place_of_point, once = _places(xyz_m)
+    # Of what is not kept, large clouds leave no room beside the program.
+    place_of_point, once = _places(xyz_m if rows is None else xyz_m[rows])
     if backend == "none" or len(once) <= neighbours:
-        return np.arange(len(xyz_m)), {}
+        return np.arange(len(place_of_point)), {}
     if backend == "pdal":
         kept = _by_pdal(once, neighbours, multiplier, pdal)
         versions = {"pdal": pdal_program.version(pdal)}
@@ -88,10 +92,8 @@ def _places(xyz_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The place of every point, and the places themselves in the order of their first points."""
     first = first_at_place(xyz_m)
     once = first == np.arange(len(xyz_m))
-    if once.all():
-        return first, xyz_m
-    rank = np.cumsum(once) - 1
-    return rank[first], xyz_m[once]
+    rank = np.cumsum(once, dtype=np.int32) - 1
+    return rank[first], xyz_m if once.all() else xyz_m[once]
 
 
 def _by_pdal(xyz_m: np.ndarray, neighbours: int, multiplier: float, program: str) -> np.ndarray:

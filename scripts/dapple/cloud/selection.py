@@ -11,6 +11,12 @@ from dapple.formats.cloud_raw import KNOWN_NAMES, Source, Units
 from dapple.formats.clouds import Cloud
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "us-ft": 1200 / 3937}
+UP = {
+    "z": np.eye(3),
+    "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
+    "-z": np.diag([1.0, -1.0, -1.0]),
+}
+"""Rotations, by the axis of a file that points up, to east, north, up."""
 NOISE_CLASSES = (7, 18)
 """ASPRS: low and high noise."""
 
@@ -62,7 +68,7 @@ def take(
     if unit != "auto":
         source = replace(source, units=Units(UNITS[unit], UNITS[unit]))
     cloud, source = in_metres(cloud, source, path)
-    cloud = turned_up(cloud, up)
+    cloud, source = turned_up(cloud, source, up)
     cloud, left_out = without_marked(cloud, path)
     attributes, notes = storable(cloud.attributes)
     return (
@@ -119,14 +125,23 @@ def in_metres(cloud: Cloud, source: Source, path: str | Path) -> tuple[Cloud, So
     return changed, replace(source, step=step, scans=scans, notes=(*source.notes, note))
 
 
-def turned_up(cloud: Cloud, up: str) -> Cloud:
-    """The cloud turned about x so that an axis of its world points up."""
+def turned_up(cloud: Cloud, source: Source, up: str) -> tuple[Cloud, Source]:
+    """The cloud and its scanners turned about x so that an axis of their world points up."""
     if up == "z":
-        return cloud
-    x, y, z = cloud.world_xyz_m.T
-    world = np.stack({"y": (x, -z, y), "-z": (x, -y, -z)}[up], axis=1)
+        return cloud, source
+    turn = UP[up]
+    world = cloud.world_xyz_m @ turn.T
     origin = frames.choose_origin(world)
-    return Cloud(frames.to_local(world, origin), origin, cloud.attributes)
+    scans = tuple(
+        replace(
+            s,
+            position_m=None if s.position_m is None else turn @ s.position_m,
+            rotation=None if s.rotation is None else turn @ s.rotation,
+        )
+        for s in source.scans
+    )
+    turned = Cloud(frames.to_local(world, origin), origin, cloud.attributes)
+    return turned, replace(source, scans=scans)
 
 
 def without_marked(cloud: Cloud, path: str | Path) -> tuple[Cloud, dict[str, int]]:

@@ -11,6 +11,7 @@ from dapple import frames
 from dapple.cloud import ordered, scan_windows
 from dapple.cloud.ingest import shots_from_scan
 from dapple.cloud.lattice import ScanFrame
+from dapple.cloud.selection import UP
 from dapple.errors import MissingMissesError
 from dapple.formats import clouds
 from dapple.formats.cloud_raw import Fired, Source
@@ -30,6 +31,7 @@ def open_shots(
     how: str,
     positions: str | Path,
     scan_frame: dict[str, Any],
+    up: str = "z",
 ) -> tuple[Iterator[tuple[Shots, dict]], bool]:
     """The shots of a cloud's file, scan by scan.
 
@@ -47,6 +49,8 @@ def open_shots(
         Table of scan positions; empty where there is none.
     scan_frame : dict
         Fields of `ScanFrame`, for `scan_frame`.
+    up : {"z", "y", "-z"}
+        Axis of the file that points up.
 
     Returns
     -------
@@ -60,12 +64,14 @@ def open_shots(
     MissingMissesError
         The file keeps no shots, and nothing is known from which to rebuild them.
     """
+    unit_m, turn = source.units.horizontal_m, UP[up]
     if how in ("auto", "recorded"):
         if Path(path).suffix.lower() in ORDERED:
             if any(scan.shots for scan in source.scans):
-                return ordered.shots_from_file(path, cloud.origin_m), False
+                shots = ordered.shots_from_file(path, cloud.origin_m, unit_m=unit_m, turn=turn)
+                return shots, False
         elif (fired := clouds.fired(path)) is not None:
-            return one_by_one(fired, cloud.origin_m)
+            return one_by_one(fired.in_metres(unit_m, turn), cloud.origin_m)
     if how == "scan_frame":
         return iter([_framed(path, cloud, positions, scan_frame)]), False
     if how in ("auto", "positions"):
@@ -82,18 +88,20 @@ def open_shots(
 
 
 def places_of(source: Source, positions: str | Path, origin_m: np.ndarray) -> pd.DataFrame | None:
-    """Where the scanners stood: as the table has it, else as the file does; None: neither does."""
+    """Where and how the scanners stood: as the table has it, else as the file does, else None."""
     if positions:
         return scan_windows.read_positions(positions, origin_m)
-    stated = {
-        scan.number: frames.to_local(scan.position_m, origin_m)
-        for scan in source.scans
-        if scan.position_m is not None
-    }
-    if not stated or len(stated) < len(source.scans):
+    if not source.scans:
         return None
-    table = pd.DataFrame(list(stated.values()), columns=["x_m", "y_m", "z_m"])
-    return table.assign(position=list(stated))
+    rows = []
+    for scan in source.scans:
+        if scan.position_m is None:
+            return None
+        place = zip(("x_m", "y_m", "z_m"), frames.to_local(scan.position_m, origin_m), strict=True)
+        rotation = np.eye(3) if scan.rotation is None else scan.rotation
+        tilt = zip(scan_windows.TILT, frames.scanner_angles_deg(rotation), strict=True)
+        rows.append({"position": scan.number, **dict(place), **dict(tilt)})
+    return pd.DataFrame(rows)
 
 
 def one_by_one(fired: Fired, origin_m: np.ndarray) -> tuple[Iterator[tuple[Shots, dict]], bool]:

@@ -72,7 +72,7 @@ def read(path: Path) -> RawCloud:
             shots = None if scan.shape is None else scan.shape[0] * scan.shape[1]
             left_out[MISSED] += scan.invalid
             left_out[AT_SCANNER] += scan.at_scanner
-            facts.append(ScanFacts(number, scan.position_m, n, shots))
+            facts.append(ScanFacts(number, scan.position_m, n, shots, scan.rotation))
     attributes = joined(pieces)
     xyz = attributes.pop("xyz", np.empty((0, 3)))
     source = Source(

@@ -2,7 +2,7 @@
 
 Each scan: columns, rows, scanner position, three axes, a 4 × 4 matrix for row vectors (translation
 in its last row), then one line a shot, column by column: `x y z intensity [r g b]` in the scanner's
-frame. `0 0 0` is a shot without return.
+frame. `0 0 0`, of some programs `nan nan nan`, is a shot without return.
 """
 
 import io
@@ -101,7 +101,7 @@ def _returns(path: Path, handle: BinaryIO, shots: int, number: int) -> dict[str,
         table = _numbers(path, b"".join(lines), number)
         if len(table) != n:
             raise _wrong(path, f"an empty line among the shots of scan {number}")
-        hit = table[:, :3].any(axis=1)
+        hit = table[:, :3].any(axis=1) & ~np.isnan(table[:, :3]).any(axis=1)
         kept = table[hit]
         piece = {"xyz": kept[:, :3], "cell": np.flatnonzero(hit) + at}
         if table.shape[1] > 3:

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -52,12 +52,15 @@ class ScanFacts:
         Returns of the scan.
     shots : int or None
         Shots of the scan, those that met nothing included; None where they are not recorded.
+    rotation : (3, 3) float64 or None
+        From the scanner's own frame to the world's; None where the file does not say.
     """
 
     number: int
     position_m: np.ndarray | None
     points: int
     shots: int | None = None
+    rotation: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -149,6 +152,15 @@ class Fired:
         """(m, 3) place of each return [m]."""
         shot = np.repeat(np.arange(len(self.direction)), np.diff(self.first))
         return self.origin_m[shot] + self.direction[shot] * self.range_m[:, None]
+
+    def in_metres(self, unit_m: float, turn: np.ndarray) -> "Fired":
+        """The same from units of so many metres, in a world turned by a rotation (3, 3)."""
+        return replace(
+            self,
+            origin_m=self.origin_m @ turn.T * unit_m,
+            direction=self.direction @ turn.T,
+            range_m=self.range_m * unit_m,
+        )
 
     def to_raw(self) -> "RawCloud":
         """The returns as points; shots without return are counted as left out."""

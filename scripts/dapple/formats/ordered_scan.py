@@ -1,6 +1,6 @@
 """Ordered scans, as of PTX and E57: returns that know the column and the row of their shot."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -48,6 +48,15 @@ class OrderedScan:
         found = np.zeros(self.shape, bool)
         found[self.column, self.row] = True
         return found
+
+    def in_metres(self, unit_m: float, turn: np.ndarray) -> "OrderedScan":
+        """The same from units of so many metres, in a world turned by a rotation (3, 3)."""
+        return replace(
+            self,
+            xyz_m=self.xyz_m * unit_m,
+            rotation=turn @ self.rotation,
+            position_m=turn @ self.position_m * unit_m,
+        )
 
     def transposed(self) -> "OrderedScan":
         """The same with columns for rows: some writers number them the other way."""
