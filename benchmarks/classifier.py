@@ -1,12 +1,13 @@
 """Every classifier of leaf and wood on kinds of trees and scanners that none was taught by.
 
     python benchmarks/classifier.py [--trees plane beech olive pine] [--seed 1] [--docs docs]
+        [--classifiers geometry "learned: shape" …]
 
 Virtual trees are scanned, cleaned and classified, with the reflectance of their points and without.
 Scores are those of all points, and of those that are leaf or of wood at least as thick as the beam
 is wide there: of thinner wood every return is partly of what lies behind it
 (docs/data/classifier.csv). Thinned scores are how many of the points are classified alike where
-half of them, by chance, are left out.
+half of them, by chance, are left out. Rows of classifiers that are not asked for stay in the table.
 """
 
 import argparse
@@ -35,11 +36,14 @@ WAYS = {
     "learned: shape and reflectance": ("learned", True),
 }
 """Method, and whether it is given reflectance."""
+ORDER = [*labelled_scans.UNSEEN, *labelled_scans.OTHER_SCANNERS, *WAYS]
+"""Of the rows of the table."""
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--trees", nargs="+", default=list(labelled_scans.UNSEEN))
+    parser.add_argument("--classifiers", nargs="+", default=list(WAYS), choices=WAYS)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--docs", type=Path, default=Path(__file__).parents[1] / "docs")
     options = parser.parse_args()
@@ -49,15 +53,23 @@ def main() -> None:
         for scanner, settings in labelled_scans.OTHER_SCANNERS.items():
             seed = stream_seed(options.seed, tree, scanner)
             cloud = labelled_scans.scan(plant, seed=seed, **settings)
-            for name, (method, bright) in WAYS.items():
+            for name in options.classifiers:
+                method, bright = WAYS[name]
                 row = {"tree": tree, "classifier": name, "scanner": scanner}
                 runs.append(row | tried(cloud, method, bright, seed))
                 print(runs[-1], flush=True)
-    table = pd.DataFrame(runs)
+    table, path = pd.DataFrame(runs), options.docs / "data" / "classifier.csv"
+    if set(options.classifiers) < set(WAYS):
+        kept = pd.read_csv(path).query("tree != 'mean' and classifier not in @options.classifiers")
+        table = pd.concat([kept, table]).sort_values(
+            ["tree", "scanner", "classifier"],
+            key=lambda column: column.map({name: k for k, name in enumerate(ORDER)}),
+            kind="stable",
+        )
     means = table.drop(columns=["tree", "scanner"]).groupby("classifier", sort=False).mean()
     means = means.reset_index().assign(tree="mean", scanner="all")
     table = pd.concat([means, table])[table.columns]
-    table.to_csv(options.docs / "data" / "classifier.csv", index=False, float_format="%.3g")
+    table.to_csv(path, index=False, float_format="%.3g")
 
 
 def tried(cloud: Cloud, method: str, bright: bool, seed: int) -> dict[str, float]:

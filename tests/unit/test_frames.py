@@ -38,6 +38,12 @@ def test_a_yawed_scanner_looks_counter_clockwise_from_east():
     assert looks_at == pytest.approx([0, 1, 0], abs=1e-15)
 
 
+def test_angles_of_a_scanner_come_back_from_its_rotation():
+    angles = (10.0, -20.0, 140.0)
+    found = frames.scanner_angles_deg(frames.scanner_rotation(*angles))
+    assert found == pytest.approx(angles)
+
+
 def test_roll_comes_first_then_pitch_then_yaw():
     from scipy.spatial.transform import Rotation
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from dapple import frames
-from dapple.cloud import ingest, lattice, ordered
+from dapple.cloud import ingest, lattice, ordered, selection, shot_sources
 from dapple.cloud.lattice import ScanFrame
 from dapple.errors import EmptyCloudError, InputError
 from dapple.formats import clouds
@@ -233,6 +233,38 @@ def test_ptx_shots_and_points_share_origin_and_place(tmp_path):
     assert shots.return_xyz_m == pytest.approx(cloud.xyz_m, abs=1e-5)
     assert set(cloud.attributes["Green"]) == {20}
     assert (shots.origin_m + shots.world_origin_m)[0] == pytest.approx([410505, 5317088, 290])
+
+
+@pytest.mark.parametrize(("unit", "unit_m"), [("m", 1.0), ("ft", 0.3048)])
+@pytest.mark.parametrize("up", ["z", "y", "-z"])
+def test_shots_turn_and_grow_with_their_points(tmp_path, unit, unit_m, up):
+    position = np.array([12.0, 7.0, 1.6])
+    hit = window(rows=(0, 22), columns=(0, 50))
+    write_ptx(tmp_path / "a.ptx", hit, position=(selection.UP[up].T @ position / unit_m).tolist())
+    taken = selection.take(
+        *clouds.read_with_source(tmp_path / "a.ptx"), tmp_path / "a.ptx", unit=unit, up=up
+    )
+    fired, _ = shot_sources.open_shots(
+        tmp_path / "a.ptx", *taken, how="auto", positions="", scan_frame={}, up=up
+    )
+    ((shots, _),) = fired
+    cloud, source = taken
+    assert shots.return_xyz_m == pytest.approx(cloud.xyz_m, abs=1e-5)
+    assert (shots.origin_m + shots.world_origin_m)[0] == pytest.approx(position, abs=1e-5)
+    assert source.scans[0].position_m == pytest.approx(position, abs=1e-5)
+    assert shots.range_m == pytest.approx(5 * unit_m, abs=1e-5)
+    misses = shots.direction[shots.n_returns == 0]
+    assert misses[:, 2].min() >= np.cos(np.radians(100.0)) - 1e-9  # below stood what it stood on
+
+
+def test_a_shot_without_return_may_be_no_number(tmp_path):
+    write_ptx(tmp_path / "a.ptx", window(rows=(0, 22)))
+    text = (tmp_path / "a.ptx").read_text()
+    noughts = " ".join(["0.000000"] * 3)
+    (tmp_path / "b.ptx").write_text(text.replace(f"\n{noughts} 0.5", "\nnan nan nan 0.5"))
+    (one, _), (other, _) = (all_shots(tmp_path / f"{name}.ptx") for name in "ab")
+    assert np.array_equal(one.direction, other.direction)
+    assert (other.n_returns == 0).sum() > 0
 
 
 def test_a_ptx_that_is_no_grid_is_refused(tmp_path):

@@ -160,6 +160,28 @@ def test_places_that_the_file_states_need_no_table(tmp_path):
     assert [fact["scan"] for _, fact in found] == [1, 2]
 
 
+def test_a_file_that_states_how_scanners_stood_needs_no_table_of_their_tilt(tmp_path):
+    tilt = (2.0, -3.0, 40.0)
+    xyz, number, empty = scans(tilt_deg=tilt)
+    cloud = Cloud(xyz, attributes={"PointSourceId": number})
+    turn = frames.scanner_rotation(*tilt)
+    facts = tuple(ScanFacts(k, place, 5000, None, turn) for k, place in enumerate(PLACES, 1))
+    clouds.write(tmp_path / "a.laz", cloud)
+    table = shot_sources.places_of(Source(scans=facts), "", cloud.origin_m)
+    assert scan_windows.tilt_of(table.iloc[1].to_dict()) == pytest.approx(tilt)
+    found, _ = opened(tmp_path / "a.laz", cloud, Source(scans=facts))
+    stated = {fact["scan"]: fact["n_misses"] for _, fact in found}
+    assert stated[1] == pytest.approx(empty[0], abs=0.4 * empty[0])
+    assert stated == {
+        fact["scan"]: fact["n_misses"]
+        for _, fact in scan_windows.rebuild(
+            cloud, pd.DataFrame(PLACES, columns=["x_m", "y_m", "z_m"]).assign(
+                position=[1, 2], roll_deg=2.0, pitch_deg=-3.0, yaw_deg=40.0
+            )
+        )
+    }  # fmt: skip
+
+
 def test_points_without_places_have_no_shots(tmp_path):
     cloud = Cloud(scanned(SCANNER)[0])
     clouds.write(tmp_path / "a.laz", cloud)

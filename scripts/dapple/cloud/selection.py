@@ -68,7 +68,7 @@ def take(
     if unit != "auto":
         source = replace(source, units=Units(UNITS[unit], UNITS[unit]))
     cloud, source = in_metres(cloud, source, path)
-    cloud, source = turned_up(cloud, source, up)
+    cloud, source = turned_up(cloud, up), _scanners_turned(source, up)
     cloud, left_out = without_marked(cloud, path)
     attributes, notes = storable(cloud.attributes)
     return (
@@ -125,13 +125,18 @@ def in_metres(cloud: Cloud, source: Source, path: str | Path) -> tuple[Cloud, So
     return changed, replace(source, step=step, scans=scans, notes=(*source.notes, note))
 
 
-def turned_up(cloud: Cloud, source: Source, up: str) -> tuple[Cloud, Source]:
-    """The cloud and its scanners turned about x so that an axis of their world points up."""
+def turned_up(cloud: Cloud, up: str) -> Cloud:
+    """The cloud turned about x so that an axis of its world points up."""
     if up == "z":
-        return cloud, source
-    turn = UP[up]
-    world = cloud.world_xyz_m @ turn.T
+        return cloud
+    world = cloud.world_xyz_m @ UP[up].T
     origin = frames.choose_origin(world)
+    return Cloud(frames.to_local(world, origin), origin, cloud.attributes)
+
+
+def _scanners_turned(source: Source, up: str) -> Source:
+    """What the file says of scanners, turned like its points."""
+    turn = UP[up]
     scans = tuple(
         replace(
             s,
@@ -140,8 +145,7 @@ def turned_up(cloud: Cloud, source: Source, up: str) -> tuple[Cloud, Source]:
         )
         for s in source.scans
     )
-    turned = Cloud(frames.to_local(world, origin), origin, cloud.attributes)
-    return turned, replace(source, scans=scans)
+    return replace(source, scans=scans)
 
 
 def without_marked(cloud: Cloud, path: str | Path) -> tuple[Cloud, dict[str, int]]:
