@@ -15,7 +15,7 @@ FOLDERS = ("scripts", "benchmarks", "tools", "tests")
 OF_LIBRARIES = {
     "pytest": "test_* one_thread pytestmark",
     "selenium": "binary_location",
-    "pydantic": "model_config handler",
+    "pydantic": "model_config handler _no_truth_value_for_a_number",
     "vulture": "used_names",
     "Mitsuba and Dr.Jit": "m_flags parameters_changed eta sampled_type sampled_component maxt",
     "CSF": "bSloopSmooth cloth_resolution class_threshold",

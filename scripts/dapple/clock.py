@@ -8,6 +8,9 @@ from datetime import UTC, datetime, timedelta, tzinfo
 from dapple.errors import InputError
 from dapple.timezones import find_timezone
 
+MOST_TIMES = 1_000_000
+"""About two years in steps of a minute."""
+
 
 def time_range(
     start: str, end: str, step_min: float, timezone: str, where: str = "time"
@@ -28,8 +31,8 @@ def time_range(
     Raises
     ------
     InputError
-        Not a time, an unknown zone, an hour that the clock skips or repeats, no positive step, or
-        an end before the start.
+        Not a time, an unknown zone, an hour that the clock skips or repeats, no positive step, an
+        end before the start, or more than `MOST_TIMES` times.
     """
     zone = find_timezone(timezone, where)
     first, last = (
@@ -43,6 +46,13 @@ def time_range(
             "Exchange the ends or mend the step.",
         )
     count = 1 + (last - first) // timedelta(minutes=step_min)
+    if count > MOST_TIMES:
+        raise InputError(
+            where,
+            f"{count:,} times from {first} to {last} every {step_min:g} min",
+            f"no more than {MOST_TIMES:,}",
+            "Take a longer step or a shorter span: runs of one year each, for example.",
+        )
     return [first + timedelta(minutes=k * step_min) for k in range(count)]
 
 

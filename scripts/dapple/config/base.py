@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from datetime import date, datetime
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, MinLen
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, field_validator
 from pydantic_core import CoreSchema, core_schema
 
 Positive = Annotated[float, Gt(0)]
@@ -17,6 +17,8 @@ Count = Annotated[int, Ge(1)]
 Item = TypeVar("Item")
 Some = Annotated[tuple[Item, ...], MinLen(1)]
 """A list that is not empty."""
+Name = Annotated[str, MinLen(1)]
+"""A word that is not empty."""
 
 
 def _moment(value: Any) -> Any:
@@ -29,8 +31,17 @@ def _moment(value: Any) -> Any:
     return text
 
 
+def _takes_a_number(annotation: Any) -> bool:
+    inner = get_args(annotation)
+    if get_origin(annotation) is Literal:
+        return any(isinstance(one, int) for one in inner)
+    return annotation in (int, float) or any(_takes_a_number(one) for one in inner)
+
+
 Moment = Annotated[str, BeforeValidator(_moment)]
-MomentOrNone = Annotated[str, BeforeValidator(lambda value: _moment(value) if value else "")]
+MomentOrNone = Annotated[
+    str, BeforeValidator(lambda value: "" if value in ("", None) else _moment(value))
+]
 LeafAngles = Literal[
     "spherical", "planophile", "erectophile", "plagiophile", "extremophile", "uniform"
 ]
@@ -62,7 +73,18 @@ def key(default: Any, text: str, source: str = "") -> Any:
 class Section(BaseModel):
     """A group of parameters; keys that are not parameters are errors."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, validate_default=True, allow_inf_nan=False
+    )
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _no_truth_value_for_a_number(cls, value: Any, info: ValidationInfo) -> Any:
+        """`yes` would be 1: refuse it where a number is asked for."""
+        field = cls.model_fields[info.field_name or ""]
+        if isinstance(value, bool) and _takes_a_number(field.annotation):
+            raise ValueError("a number; YAML takes yes, no, on, off, true and false for no number")
+        return value
 
 
 class TimedTable(Section):

@@ -239,7 +239,8 @@ def sensors(settings: Settings, where: str) -> None:
 def times(settings: Settings, where: str) -> None:
     """There are times, and zones to read them in."""
     for section in ("site", "time", "radiation", "measured"):
-        if zone := getattr(settings, section).timezone:
+        zone = getattr(settings, section).timezone
+        if zone or section == "site":
             find_timezone(zone, f"{where}, `{section}.timezone`")
     clock.time_range(**dict(settings.time), where=f"{where}, `time`")
 

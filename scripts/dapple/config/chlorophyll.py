@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from annotated_types import Ge, Gt, Le, Lt
+from pydantic import AllowInfNan
 
 from dapple.config.base import (
     Count,
@@ -35,7 +36,9 @@ class OwnPlot(Section):
         (), "number of the image's band for each of the camera; empty: by name, wavelength, colour"
     )
     scale: NotNegative = key(0.0, "value that means a reflectance of 1; 0: the file's own, or none")
-    nodata: float | None = key(None, "value that means no data, besides the file's own")
+    nodata: Annotated[float, AllowInfNan()] | None = key(
+        None, "value that means no data, besides the file's own"
+    )
     crowns: str = key(
         "", "GeoPackage, Shapefile or GeoJSON of crowns, relative to data_dir; empty: cells only"
     )

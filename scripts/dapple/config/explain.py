@@ -42,9 +42,15 @@ def explain(error: ValidationError, settings: type[BaseModel], where: str) -> In
     return InputError(
         where,
         f"`{key}: {first['input']!r}`",
-        first["msg"].removeprefix("Input should be ").removeprefix("Value error, "),
+        _expected(first["msg"]),
         REMEDIES.get(first["type"], "See config/README.md for the meaning and range of every key."),
     )
+
+
+def _expected(message: str) -> str:
+    """What pydantic wants, as in `expected …`."""
+    message = message.removeprefix("Value error, ").removeprefix("Input should be ")
+    return re.sub(r"^\w+ should ", "to ", message)
 
 
 def _nearest(location: tuple[int | str, ...], keys: list[str]) -> str:

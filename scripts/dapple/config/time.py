@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from dapple.config.base import FREY, Moment, Positive, Section, key
+from typing import Annotated
+
+from annotated_types import Ge, Le
+
+from dapple.config.base import FREY, Moment, Section, key
 
 
 class Time(Section):
@@ -10,5 +14,5 @@ class Time(Section):
 
     start: Moment = key("2023-08-10 10:10", "first time", FREY)
     end: Moment = key("2023-08-10 16:50", "last time", FREY)
-    step_min: Positive = key(10.0, "minutes between times")
+    step_min: Annotated[float, Ge(0.01), Le(527_040)] = key(10.0, "minutes between times")
     timezone: str = key("UTC", "IANA zone of start and end")

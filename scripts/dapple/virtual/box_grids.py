@@ -38,6 +38,6 @@ def voxels_per_cell(cell_size_m: float, voxel_size_m: float) -> int:
             "survey.cell_size_m",
             f"{cell_size_m:g} m with voxels of {voxel_size_m:g} m",
             "a multiple of survey.voxel_size_m",
-            "Contact frequency counts the voxels in a cell.",
+            f"Contact frequency counts the voxels in a cell: take {5 * voxel_size_m:g}.",
         )
     return round(ratio)
