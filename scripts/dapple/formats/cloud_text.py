@@ -57,7 +57,7 @@ def read(path: Path) -> RawCloud:
     ours = distinct(attribute_name(name) for name in others)
     attributes = {}
     for name, found in zip(others, ours, strict=True):
-        values = _attribute(table[name], name, notes)
+        values = _attribute(table[name], name, layout.decimal, notes)
         if values is not None:
             attributes[found] = values
     if scan is not None and "PointSourceId" not in attributes:
@@ -167,8 +167,10 @@ def _axes(path: Path, layout: Layout) -> tuple[list[str], np.ndarray, bool]:
     return order, factor, degrees
 
 
-def as_numbers(column: pd.Series) -> pd.Series:
+def as_numbers(column: pd.Series, decimal: str = ".") -> pd.Series:
     """Numbers of a column of text, NaN for what is none; whole numbers may be of any length."""
+    if decimal != ".":
+        column = column.astype(str).str.replace(decimal, ".", regex=False).where(column.notna())
     try:
         return pd.to_numeric(column, errors="coerce")
     except OverflowError:
@@ -178,7 +180,7 @@ def as_numbers(column: pd.Series) -> pd.Series:
 def _numbers(path: Path, column: pd.Series, layout: Layout) -> np.ndarray:
     if column.dtype.kind in "iufb":
         return column.to_numpy(float)
-    numbers = as_numbers(column)
+    numbers = as_numbers(column, layout.decimal)
     bad = np.flatnonzero((numbers.isna() & column.notna()).to_numpy())
     if len(bad):
         row = int(bad[0])
@@ -187,13 +189,13 @@ def _numbers(path: Path, column: pd.Series, layout: Layout) -> np.ndarray:
     return numbers.to_numpy(float)
 
 
-def _attribute(column: pd.Series, name: str, notes: list[str]) -> np.ndarray | None:
+def _attribute(column: pd.Series, name: str, decimal: str, notes: list[str]) -> np.ndarray | None:
     """Numbers of a column that is not a coordinate; None where it is text or empty."""
     if column.isna().all():
         return None
     if column.dtype.kind in "iufb":
         return column.to_numpy()
-    numbers = as_numbers(column)
+    numbers = as_numbers(column, decimal)
     bad = np.flatnonzero((numbers.isna() & column.notna()).to_numpy())
     if not len(bad):
         return numbers.to_numpy()

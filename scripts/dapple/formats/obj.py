@@ -1,5 +1,6 @@
 """Wavefront OBJ of polygons, in the axes of LESS, DART or the local frame."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -48,8 +49,10 @@ def read(path: str | Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         with path.open(encoding="utf-8", errors="replace") as file:
             for number, line in enumerate(file, start=1):  # noqa: B007
                 if line.startswith("v "):
-                    x, y, z = line.split()[1:4]
-                    vertices.append([float(x), float(y), float(z)])
+                    x, y, z = (float(word) for word in line.split()[1:4])
+                    if not math.isfinite(x + y + z):
+                        raise ValueError("no finite coordinates")
+                    vertices.append([x, y, z])
                 elif line.startswith("f "):
                     corners = [int(word.split("/")[0]) for word in line.split()[1:]]
                     faces.append([i - 1 if i > 0 else len(vertices) + i for i in corners])

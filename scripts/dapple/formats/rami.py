@@ -4,6 +4,7 @@ A file of discs has one line a disc, `radius x y z nx ny nz` in metres; a file o
 line a place, `x y z`, where the object of the first file stands.
 """
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -59,9 +60,18 @@ def _table(path: str | Path, n_columns: int, names: str) -> np.ndarray:
     if not path.is_file():
         raise InputError(path, "no file", f"lines `{names}`", "Check the path.")
     try:
-        table = np.loadtxt(path, ndmin=2)
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "loadtxt: input contained no data")
+            table = np.loadtxt(path, ndmin=2)
     except ValueError as error:
         raise InputError(path, str(error), f"lines `{names}`", "Copy the file again.") from error
+    if not table.size:
+        raise InputError(path, "no line", f"lines `{names}`", "Copy the file again.")
+    if not np.isfinite(table).all():
+        line = int(np.flatnonzero(~np.isfinite(table).all(axis=1))[0]) + 1
+        raise InputError(
+            path, f"line {line} with no finite number", f"lines `{names}`", "Correct the line."
+        )
     if table.shape[1] != n_columns:
         raise InputError(
             path,

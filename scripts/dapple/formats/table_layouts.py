@@ -101,6 +101,8 @@ def _pangaea(path: Path, lines: Sequence[str]) -> Table | None:
     end = next((k for k, line in enumerate(lines) if line.strip().endswith("*/")), None)
     if end is None:
         raise InputError(path, "a comment without its end", "`*/`", "Copy the file again.")
+    if end + 1 == len(lines):
+        raise InputError(path, "nothing but a comment", "a table below it", "Copy the file again.")
     table = build(path, lines, header=end + 1, delimiter="\t", layout="PANGAEA")
     wanted = {"time": ["Date/Time"], "global": ["SWD", "Short-wave downward (GLOBAL) radiation"],
               "diffuse": ["DIF", "Diffuse radiation"]}  # fmt: skip

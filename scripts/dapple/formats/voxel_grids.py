@@ -147,6 +147,11 @@ def read_vox(path: str | Path) -> xr.Dataset:
         raise InputError(path, found, f"{math.prod(shape)} with i, j, k, PadBVTotal", _REMEDY)
     if len(np.unique(index, axis=1).T) != len(table) or not _inside(index, shape):
         raise InputError(path, "voxels twice or outside the space", expected, _REMEDY)
+    density = pd.to_numeric(table["PadBVTotal"], errors="coerce")
+    if (density < 0).any() or np.isinf(density).any():
+        worst = int(np.flatnonzero((density < 0) | np.isinf(density))[0])
+        found = f"a plant area density of {density[worst]:g} in row {worst + 1} of the table"
+        raise InputError(path, found, "0 or more, or NaN where it is not known", _REMEDY)
     at = np.ravel_multi_index(index, shape)
     data = {}
     for name in table.columns.difference(["i", "j", "k"]):

@@ -125,22 +125,41 @@ def camera(rows: Sequence[tuple[str, float, float]], responses: str | Path = "")
     Raises
     ------
     InputError
-        No such file, no wavelengths, or cells of a band that are no numbers.
+        No such file, no wavelengths or one twice, cells of a band that are no numbers, or a
+        response below 0.
     """
     bands = tuple(Band(*row) for row in rows)
     if not responses:
         return Camera(bands)
-    # Needs pandas, which the configuration, where bands have their defaults from, does without.
-    from dapple.formats import user_tables
-
-    table = user_tables.read(responses)
-    wavelength = table.column(["wavelength_nm"], "the camera's responses")
-    order = wavelength.argsort()
-    curves = {
-        band.name: tuple(zip(wavelength[order], table.column([band.name], "")[order], strict=True))
-        for band in bands
-        if table.find([band.name])
-    }
+    curves = _curves(responses, [band.name for band in bands])
     return Camera(
         tuple(Band(b.name, b.centre_nm, b.width_nm, curves.get(b.name, ())) for b in bands)
     )
+
+
+def _curves(path: str | Path, names: Sequence[str]) -> dict[str, tuple[tuple[float, float], ...]]:
+    """Response curves of those bands that the table has, by ascending wavelength."""
+    # Needs pandas, which the configuration, where bands have their defaults from, does without.
+    from dapple.formats import user_tables
+
+    table = user_tables.read(path)
+    wavelength = table.column(["wavelength_nm"], "the camera's responses").tolist()
+    if len(set(wavelength)) < max(2, len(wavelength)):
+        raise InputError(
+            path,
+            f"{len(wavelength)} rows with {len(set(wavelength))} different wavelengths",
+            "two or more wavelengths, each once",
+            "Average the rows of one wavelength, or copy the file again.",
+        )
+    curves = {}
+    for name in filter(lambda name: table.find([name]), names):
+        response = table.column([name], "").tolist()
+        if not min(response) >= 0 or not max(response) > 0:
+            raise InputError(
+                f"{path}, column {name!r}",
+                f"responses from {min(response):g} to {max(response):g}",
+                "0 or more, and more than 0 somewhere",
+                "Set noise below 0 to 0; check that the column is this band's response.",
+            )
+        curves[name] = tuple(sorted(zip(wavelength, response, strict=True)))
+    return curves

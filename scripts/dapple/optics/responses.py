@@ -45,13 +45,7 @@ def read(path: str | Path) -> Response:
         Another file; angles that do not ascend from 0 to 90; a response that is not positive, but
         for 0 at 90 degrees.
     """
-    try:
-        with Path(path).open(newline="", encoding="utf-8-sig") as file:
-            rows = [[float(row[name]) for name in COLUMNS] for row in csv.DictReader(file)]
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(
-            path, f"{error}", "numbers in the columns angle_deg and response", "Correct it."
-        ) from error
+    rows = _rows(path)
     angles, values = zip(*rows, strict=True) if rows else ((), ())
     steps = itertools.pairwise(angles)
     if angles[:1] != (0.0,) or angles[-1] != 90.0 or any(b <= a for a, b in steps):
@@ -69,3 +63,26 @@ def read(path: str | Path) -> Response:
             "Leave out rows of no light, or write a small number.",
         )
     return tuple((angle, value / values[0]) for angle, value in rows)
+
+
+def _rows(path: str | Path) -> list[list[float]]:
+    """Angle and response of every row."""
+    expected = "a CSV with numbers in the columns angle_deg and response"
+    rows = []
+    try:
+        with Path(path).open(newline="", encoding="utf-8-sig") as file:
+            table = csv.DictReader(file)
+            if lacking := [name for name in COLUMNS if name not in (table.fieldnames or ())]:
+                remedy = "Name the columns so in the first line, with a comma between them."
+                raise InputError(path, f"no column {' and no '.join(lacking)}", expected, remedy)
+            for row in table:
+                try:
+                    rows.append([float(row[name]) for name in COLUMNS])
+                except (TypeError, ValueError):
+                    found = ", ".join(str(row[name] or "nothing") for name in COLUMNS)
+                    raise InputError(
+                        f"{path}, line {table.line_num}", found, expected, "Correct the line."
+                    ) from None
+    except UnicodeDecodeError as error:
+        raise InputError(path, f"no text ({error})", expected, "Save it as UTF-8.") from error
+    return rows

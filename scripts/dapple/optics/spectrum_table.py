@@ -89,6 +89,8 @@ def read(
         for kind, (asked, usual) in names.items()
     }
     wavelength, unit = _numbers(source, at_name)
+    if not len(wavelength):
+        raise InputError(path, "no row", "a wavelength in each", "Copy or export the file again.")
     if unit.lower() in MICROMETRES or at_name.lower().endswith("_um"):
         wavelength = 1e3 * wavelength
     elif np.max(wavelength, initial=-np.inf, where=np.isfinite(wavelength)) < 30.0:
