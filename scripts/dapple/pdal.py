@@ -24,7 +24,7 @@ def find(program: str = "pdal") -> str:
 
 def version(program: str = "pdal") -> str:
     """Return PDAL's version, as in `2.2.0`."""
-    printed = programs.run([find(program), "--version"])
+    printed = programs.run([find(program), "--version"], limit_s=programs.SHORT_S)
     match = re.search(r"pdal\s+(\d[\d.]*)", printed)
     return match.group(1) if match else "unknown"
 
@@ -69,10 +69,11 @@ def uncompress(laz: str | Path, las: str | Path, program: str = "pdal") -> None:
     """
     reader = {"type": "readers.las", "filename": str(laz)}
     writer = {"type": "writers.las", "filename": str(las), "forward": "all", "extra_dims": "all"}
-    run([reader, writer], program)
+    limit_s = programs.limit_s(Path(laz).stat().st_size)  # a point has a few bytes
+    run([reader, writer], program, limit_s=limit_s)
 
 
-def run(stages: list[dict | str], program: str = "pdal", *, limit_s: float | None = None) -> None:
+def run(stages: list[dict | str], program: str = "pdal", *, limit_s: float) -> None:
     """Run a pipeline.
 
     Parameters
@@ -81,16 +82,18 @@ def run(stages: list[dict | str], program: str = "pdal", *, limit_s: float | Non
         As in PDAL's JSON; a bare string is a file to read or write.
     program : str
         PDAL's executable, see `find`.
-    limit_s : float or None
+    limit_s : float
         PDAL is ended after this time [s].
 
     Raises
     ------
     ProgramError
-        PDAL failed or did not end: the message has the command, the exit code and the end of
-        what it printed.
+        PDAL failed, did not end, or did not write what its writers should: the message has the
+        command, the exit code and the end of what it printed.
     """
     with tempfile.TemporaryDirectory(prefix="pdal-") as folder:
         pipeline = Path(folder, "pipeline.json")
         pipeline.write_text(json.dumps(stages))
-        programs.run([find(program), "pipeline", pipeline], limit_s=limit_s)
+        command = [find(program), "pipeline", pipeline]
+        makes = [s["filename"] for s in stages if isinstance(s, dict) and "writers" in s["type"]]
+        programs.run(command, limit_s=limit_s, makes=makes)

@@ -13,6 +13,8 @@ from dapple.errors import InputError
 
 PROJECT_ROOT = Path(__file__).parents[2]
 TAIL_CHARACTERS = 2000
+SHORT_S, DAY_S = 60.0, 86_400.0
+"""Time for a question, and for a simulation of any size: what takes longer hangs [s]."""
 
 
 class ProgramError(InputError):
@@ -54,8 +56,9 @@ def limit_s(n_points: int) -> float:
 def run(
     command: Sequence[str | Path],
     *,
+    limit_s: float,
+    makes: Sequence[str | Path] = (),
     environment: dict[str, str] | None = None,
-    limit_s: float | None = None,
 ) -> str:
     """Run a command to its end and return its standard output.
 
@@ -63,15 +66,17 @@ def run(
     ----------
     command : sequence of str or Path
         Program and arguments; no shell is involved.
+    limit_s : float
+        The program is ended after this time [s].
+    makes : sequence of path
+        Files that it has to leave, not empty.
     environment : dict, optional
         Variables to set on top of the current environment.
-    limit_s : float or None
-        The program is ended after this time [s].
 
     Raises
     ------
     ProgramError
-        The exit code is not zero, or the time is over.
+        The exit code is not zero, the time is over, or a file was not made.
     """
     words = [str(word) for word in command]
     try:
@@ -88,6 +93,9 @@ def run(
         raise failure(words, f"no end after {limit_s:,.0f} s", "") from None
     if done.returncode:
         raise failure(words, f"exit code {done.returncode}", done.stderr.strip() or done.stdout)
+    for path in map(Path, makes):
+        if not path.is_file() or not path.stat().st_size:
+            raise failure(words, f"no output file {path.name}", done.stderr.strip() or done.stdout)
     return done.stdout
 
 

@@ -106,9 +106,3 @@ def test_nothing_to_compare_is_an_error():
 def test_an_absent_program_is_an_error_that_says_how_to_get_it():
     with pytest.raises(InputError, match="apt-get install"):
         cloudcompare.CommandLine("/nowhere/CloudCompare")
-
-
-def test_success_without_an_output_file_is_a_failure():
-    true = cloudcompare.CommandLine("/bin/true")
-    with pytest.raises(programs.ProgramError, match="no output file"):
-        true.inliers(np.eye(3), 2, 3.0)

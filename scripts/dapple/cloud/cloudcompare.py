@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dapple import programs
-from dapple.errors import EmptyCloudError, InputError
+from dapple.errors import EmptyCloudError
 from dapple.formats.meshes import Mesh
 
 REMEDY = (
@@ -90,9 +90,12 @@ class CommandLine:
             limit_s = programs.limit_s(len(xyz_m))
             self._run([given, surface], ["-C2M_DIST"], result, limit_s)
             points = self._read(result)
-        field = next(name for name in points.dtype.names or () if name.startswith("scalar_C2M"))
-        distance_m = np.empty(len(xyz_m))
         rows = _rows(*_columns(points, ("scalar_RowHigh", "scalar_RowLow")))
+        field = next((n for n in points.dtype.names or () if n.startswith("scalar_C2M")), "")
+        if not field or not np.array_equal(np.sort(rows), np.arange(len(xyz_m))):
+            found = f"{len(rows)} distances" if field else "points without distances"
+            raise programs.failure([self.program, "-C2M_DIST"], found, f"{len(xyz_m)} points given")
+        distance_m = np.empty(len(xyz_m))
         distance_m[rows] = np.abs(points[field])  # signed where triangles have a front side
         return distance_m
 
@@ -102,11 +105,8 @@ class CommandLine:
         for path in opened:
             command += ["-O", "-GLOBAL_SHIFT", "AUTO", str(path)]
         command += [*action, "-SAVE_CLOUDS", "FILE", str(saved)]
-        printed = programs.run(
-            command, environment={"QT_QPA_PLATFORM": "offscreen"}, limit_s=limit_s
-        )
-        if not saved.is_file():
-            raise programs.failure(command, "no output file", printed)
+        offscreen = {"QT_QPA_PLATFORM": "offscreen"}
+        programs.run(command, limit_s=limit_s, makes=[saved], environment=offscreen)
 
     def _read(self, path: Path) -> np.ndarray:
         points, comments = read_points(path)
@@ -252,13 +252,16 @@ def read_points(path: Path) -> tuple[np.ndarray, str]:
         lines = []
         while (line := file.readline().decode("ascii", "replace").strip()) != "end_header":
             if not file.peek(1):
-                raise InputError(path, "a PLY header without end", "binary PLY", REMEDY)
+                raise programs.failure(["CloudCompare"], "a PLY header without end", "")
             lines.append(line)
         types = {"float": "<f4", "double": "<f8", "uchar": "u1", "int": "<i4"}
-        n_points = next(int(line.split()[2]) for line in lines if line.startswith("element vertex"))
+        n_points = next((int(s.split()[2]) for s in lines if s.startswith("element vertex")), 0)
         properties = [line.split()[1:] for line in lines if line.startswith("property")]
-        dtype = [(name, types[kind]) for kind, name in properties]
-        return np.fromfile(file, dtype, n_points), "\n".join(lines)
+        dtype = np.dtype([(name, types[kind]) for kind, name in properties])
+        points = np.fromfile(file, dtype, n_points)
+        if len(points) < n_points:
+            raise programs.failure(["CloudCompare"], f"{len(points)} of {n_points} points", "")
+        return points, "\n".join(lines)
 
 
 def _header(*elements: tuple[str, int, list[str]]) -> bytes:
@@ -284,6 +287,8 @@ def _tilted(xyz_m: np.ndarray, vertices_m: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def _columns(points: np.ndarray, names: tuple[str, ...]) -> list[np.ndarray]:
+    if lacking := set(names) - set(points.dtype.names or ()):
+        raise programs.failure(["CloudCompare"], f"no {' and no '.join(sorted(lacking))}", "")
     return [points[name] for name in names]
 
 

@@ -113,4 +113,10 @@ def _by_pdal(xyz_m: np.ndarray, neighbours: int, multiplier: float, program: str
             program,
             limit_s=programs.limit_s(len(xyz_m)),
         )
-        return np.sort(laspy.read(kept)["Row"].astype(np.int64))
+        try:
+            rows = np.sort(laspy.read(kept)["Row"].astype(np.int64))
+        except (laspy.errors.LaspyException, ValueError, KeyError, OSError) as error:
+            raise programs.failure(
+                [program, "pipeline"], "an output that cannot be read", str(error)
+            ) from error
+        return rows

@@ -36,7 +36,7 @@ def measure(clock: Callable[[], float] = time.perf_counter) -> dict[str, float]:
 
 
 def _start() -> None:
-    subprocess.run([sys.executable, "-c", IMPORTS], check=True)
+    subprocess.run([sys.executable, "-c", IMPORTS], check=True, timeout=600)
 
 
 def _median(work: Callable[[], object], n: int, clock: Callable[[], float]) -> float:
