@@ -2,7 +2,7 @@
 CORES ?= 2
 BIN := .venv/bin
 
-.PHONY: run test test-all setup lint format docs site lock coverage peers hooks
+.PHONY: run test test-all setup lint format docs site lock coverage peers reproduce hooks
 
 run: setup
 	$(BIN)/snakemake --cores $(CORES)
@@ -41,6 +41,10 @@ coverage: setup
 peers: setup
 	$(BIN)/snakemake --cores $(CORES) -- results/virtual-apple/scan/shots.parquet
 	$(BIN)/python benchmarks/peers.py virtual-apple
+
+# A small experiment twice, with one core and with two; ARGUMENTS=--write renews docs/data/checksums.csv.
+reproduce: setup
+	PYTHONPATH=scripts $(BIN)/python tools/reproduce.py $(ARGUMENTS)
 
 hooks: setup
 	$(BIN)/pre-commit install
