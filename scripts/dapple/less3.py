@@ -10,7 +10,7 @@ from pathlib import Path
 import psutil
 
 from dapple.errors import InputError
-from dapple.programs import ProgramError, failure
+from dapple.programs import ProgramError, check_made, failure
 
 IDLE_LIMIT_S = 60.0
 """A process that has done nothing for so long waits for ever [s]."""
@@ -31,7 +31,7 @@ def check(key: str) -> None:
         )
 
 
-def run(script: Path, folder: Path, *, idle_limit_s: float = IDLE_LIMIT_S) -> str:
+def run(script: Path, folder: Path, *, makes: str = "", idle_limit_s: float = IDLE_LIMIT_S) -> str:
     """Run a script that uses LESS 3 on a folder, and return what it printed.
 
     Parameters
@@ -40,13 +40,16 @@ def run(script: Path, folder: Path, *, idle_limit_s: float = IDLE_LIMIT_S) -> st
         Python, run with `folder` as its argument. What it writes must not depend on what an
         earlier attempt left.
     folder : Path
+    makes : str
+        File in the folder that the script leaves.
     idle_limit_s : float
         See Notes [s].
 
     Raises
     ------
     ProgramError
-        The exit code is not zero, or each of `ATTEMPTS` attempts waited for ever.
+        The exit code is not zero, there is no such file, or each of `ATTEMPTS` attempts waited for
+        ever.
 
     Notes
     -----
@@ -68,6 +71,7 @@ def run(script: Path, folder: Path, *, idle_limit_s: float = IDLE_LIMIT_S) -> st
             said.seek(0)
             text = said.read()
         if code == 0:
+            check_made(command, [folder / makes] if makes else [], text)
             return text
         if code is not None:
             raise failure(command, f"exit code {code}", text)

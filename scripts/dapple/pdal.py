@@ -94,6 +94,7 @@ def run(stages: list[dict | str], program: str = "pdal", *, limit_s: float) -> N
     with tempfile.TemporaryDirectory(prefix="pdal-") as folder:
         pipeline = Path(folder, "pipeline.json")
         pipeline.write_text(json.dumps(stages))
-        command = [find(program), "pipeline", pipeline]
-        makes = [s["filename"] for s in stages if isinstance(s, dict) and "writers" in s["type"]]
+        command = [find(program), "pipeline", str(pipeline)]
+        written = [one for one in stages if isinstance(one, dict) and "writers" in one["type"]]
+        makes = [str(one["filename"]) for one in written]
         programs.run(command, limit_s=limit_s, makes=makes)

@@ -13,8 +13,8 @@ from dapple.errors import InputError
 
 PROJECT_ROOT = Path(__file__).parents[2]
 TAIL_CHARACTERS = 2000
-SHORT_S, DAY_S = 60.0, 86_400.0
-"""Time for a question, and for a simulation of any size: what takes longer hangs [s]."""
+SHORT_S = 60.0
+"""Time for a question such as that for the version [s]."""
 
 
 class ProgramError(InputError):
@@ -93,10 +93,15 @@ def run(
         raise failure(words, f"no end after {limit_s:,.0f} s", "") from None
     if done.returncode:
         raise failure(words, f"exit code {done.returncode}", done.stderr.strip() or done.stdout)
+    check_made(words, makes, done.stderr.strip() or done.stdout)
+    return done.stdout
+
+
+def check_made(command: Sequence[str], makes: Sequence[str | Path], output: str) -> None:
+    """Raise where a command that printed `output` left no file of those, or an empty one."""
     for path in map(Path, makes):
         if not path.is_file() or not path.stat().st_size:
-            raise failure(words, f"no output file {path.name}", done.stderr.strip() or done.stdout)
-    return done.stdout
+            raise failure(command, f"no output file {path.name}", output)
 
 
 def failure(command: Sequence[str | Path], state: str, output: str) -> ProgramError:

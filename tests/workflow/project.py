@@ -10,6 +10,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 PARTS = ("Snakefile", "rules", "scripts", "config", "profiles", "envs", "docs")
 SMALL = "config/virtual-apple-small.yaml"
+LIMIT_S = 1800
+"""Time that a run gets: many times what it takes [s]."""
 # As it was before a test could change it.
 ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
 
@@ -23,7 +25,7 @@ class Project:
     overrides: tuple[str, ...] = ()
     experiment: str = field(default="virtual-apple-small")
 
-    def snakemake(self, *arguments, cores=2, config=()):
+    def snakemake(self, *arguments, cores=2, config=(), environment=None, umask=-1):
         """Run Snakemake to its end and return the finished process, its output as text."""
         command = [sys.executable, "-m", "snakemake", *map(str, arguments)]
         command += ["--cores", str(cores), "--nocolor", "--configfile", self.configfile]
@@ -32,11 +34,13 @@ class Project:
         return subprocess.run(
             command,
             cwd=self.folder,
-            env=ENVIRONMENT,
+            env=ENVIRONMENT | (environment or {}),
+            umask=umask,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
+            timeout=LIMIT_S,
         )
 
     def run(self, *arguments, **settings):

@@ -13,6 +13,7 @@ import rasterio
 import xarray as xr
 import yaml
 from plotly.offline import get_plotlyjs
+from tests.workflow.project import copy_of_project
 
 from dapple.config.settings import validate
 
@@ -255,8 +256,16 @@ def test_a_fault_of_the_per_timestep_engine_reaches_the_agreement(small_run, tmp
 # The same bytes
 
 
-def test_one_core_makes_the_bytes_that_two_cores_make(small_run, project):
-    project.run(*(f"results/{project.experiment}/{path}" for path in CHEAP), cores=1)
+def test_cores_locale_zone_umask_home_and_path_change_no_byte(small_run, tmp_path):
+    project = copy_of_project(tmp_path / "a b/ü/dapple")
+    (tmp_path / "at home").mkdir()
+    other = {"LC_ALL": "C", "TZ": "Pacific/Auckland", "HOME": str(tmp_path / "at home")}
+    project.run(
+        *(f"results/{project.experiment}/{path}" for path in CHEAP),
+        cores=1,
+        environment=other | {"PYTHONHASHSEED": "7"},
+        umask=0o077,
+    )
     different = [
         path
         for path in CHEAP

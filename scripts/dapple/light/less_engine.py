@@ -84,7 +84,7 @@ def simulate(folder: Path) -> dict[str, np.ndarray]:
         `par`, its parts `direct`, `sky`, `scattered`, and its `standard_error`, in the unit of the
         folder's light. What LESS prints is printed.
     """
-    print(less3.run(folder / less_files.RUNNER.name, folder))
+    print(less3.run(folder / less_files.RUNNER.name, folder, makes="light.csv"))
     table = tables.read(folder / "light.csv")
     n_sensors = len(tables.read(folder / "sensors.csv"))
     return {name: table[name].to_numpy().reshape(-1, n_sensors).T for name in PARTS}

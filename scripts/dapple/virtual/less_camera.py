@@ -98,7 +98,7 @@ def photograph(
         names = [f"m{k}" for k in range(len(used.reflectance))]
         less_obj.write(folder / "world.obj", mesh, names, used.of_face)
         (folder / "world.json").write_text(json.dumps(facts))
-        print(less3.run(RUNNER, folder))
+        print(less3.run(RUNNER, folder, makes="image.npy"))
         return np.load(folder / "image.npy")[np.argsort(order)].astype(np.float32)
 
 
