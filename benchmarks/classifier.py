@@ -7,7 +7,8 @@ Virtual trees are scanned, cleaned and classified, with the reflectance of their
 Scores are those of all points, and of those that are leaf or of wood at least as thick as the beam
 is wide there: of thinner wood every return is partly of what lies behind it
 (docs/data/classifier.csv). Thinned scores are how many of the points are classified alike where
-half of them, by chance, are left out. Rows of classifiers that are not asked for stay in the table.
+half of them, by chance, are left out. Rows of trees and classifiers that are not asked for stay in the
+table.
 """
 
 import argparse
@@ -59,9 +60,10 @@ def main() -> None:
                 runs.append(row | tried(cloud, method, bright, seed))
                 print(runs[-1], flush=True)
     table, path = pd.DataFrame(runs), options.docs / "data" / "classifier.csv"
-    if set(options.classifiers) < set(WAYS):
-        kept = pd.read_csv(path).query("tree != 'mean' and classifier not in @options.classifiers")
-        table = pd.concat([kept, table]).sort_values(
+    if path.exists():
+        known = pd.read_csv(path).query("tree != 'mean'")
+        anew = known["tree"].isin(options.trees) & known["classifier"].isin(options.classifiers)
+        table = pd.concat([known[~anew], table]).sort_values(
             ["tree", "scanner", "classifier"],
             key=lambda column: column.map({name: k for k, name in enumerate(ORDER)}),
             kind="stable",
