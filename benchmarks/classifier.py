@@ -7,8 +7,7 @@ Virtual trees are scanned, cleaned and classified, with the reflectance of their
 Scores are those of all points, and of those that are leaf or of wood at least as thick as the beam
 is wide there: of thinner wood every return is partly of what lies behind it
 (docs/data/classifier.csv). Thinned scores are how many of the points are classified alike where
-half of them, by chance, are left out. Rows of trees and classifiers that are not asked for stay in the
-table.
+half of them, by chance, are left out. Rows of trees and classifiers that are not asked for stay.
 """
 
 import argparse

@@ -1,8 +1,9 @@
 """Hand every reader broken files: each is read or refused with a message, soon, in little memory.
 
-Usage: python -m tests.fuzz.run [--count 20000] [--seed 1] [--keep FOLDER]
+Usage: python -m tests.fuzz.run [--count 20000] [--seed 1] [--keep FOLDER] [--table FILE]
 Prints how many were read and refused and every kind of fault with the number that makes it again;
-exits 1 where there is one.
+exits 1 where there is one. The table has a row for every sound file and seed; rows of other seeds
+that it has stay.
 """
 
 import argparse
@@ -17,6 +18,7 @@ from collections import Counter, defaultdict
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import pandas as pd
 from tests.fuzz import seeds, worker
 
 ROOT = Path(__file__).parents[2]
@@ -89,6 +91,18 @@ def _batch(first: int, last: int, seed: int, folder: Path, names: list[str], res
     return first
 
 
+def _put_down(result: Result, seed: int, path: Path) -> None:
+    """The counts of a run into the table of all runs."""
+    rows = [
+        {"seed": seed, "file": name} | {what: counts[what] for what in ("read", "refused", "fault")}
+        for name, counts in result.counts.items()
+    ]
+    table = pd.DataFrame(rows)
+    if path.exists():
+        table = pd.concat([pd.read_csv(path).query("seed != @seed"), table])
+    table.sort_values(["seed", "file"]).to_csv(path, index=False)
+
+
 def _processor_s(pid: int) -> float:
     """Seconds of processor time that a process has used."""
     fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
@@ -100,6 +114,7 @@ def main() -> int:
     arguments.add_argument("--count", type=int, default=20_000)
     arguments.add_argument("--seed", type=int, default=1)
     arguments.add_argument("--keep", type=Path, help="folder for a file of every kind of fault")
+    arguments.add_argument("--table", type=Path, help="for the counts")
     given = arguments.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         sound = seeds.make(Path(folder))
@@ -107,6 +122,8 @@ def main() -> int:
         result = run(given.count, given.seed, Path(folder), [one.path.name for one in sound])
     for name, counts in result.counts.items():
         print(f"{name:20s} " + ", ".join(f"{n} {what}" for what, n in sorted(counts.items())))
+    if given.table:
+        _put_down(result, given.seed, given.table)
     total = sum(result.counts.values(), Counter())
     print("in all: " + ", ".join(f"{n} {what}" for what, n in sorted(total.items())))
     for k, ((name, said), numbers) in enumerate(sorted(result.faults.items())):
