@@ -1,6 +1,7 @@
 """Hand every reader broken files: each is read or refused with a message, soon, in little memory.
 
-Usage: PYTHONPATH=scripts python -m tests.fuzz.run [--count 20000] [--seed 1] [--keep FOLDER] [--table FILE]
+Usage: PYTHONPATH=scripts python -m tests.fuzz.run [--count 20000] [--seed 1] [--keep FOLDER]
+[--table FILE]
 Prints how many were read and refused and every kind of fault with the number that makes it again;
 exits 1 where there is one. The table has a row for every sound file and seed; rows of other seeds
 that it has stay.
