@@ -83,12 +83,14 @@ def classified(folder: Path, n: int, method: str = "auto") -> None:
 def polygons(folder: Path, n: int) -> None:
     settings = SETTINGS.polygons.model_dump()
     cloud = clouds.read(folder / "classes.laz")
-    made = steps.polygons(cloud, seed=1, **settings)
+    points_m, origin_m = steps.points_by_kind(cloud), cloud.origin_m
+    del cloud
+    made = steps.polygons_of(points_m, seed=1, **settings)
     for kind, mesh in made.items():
-        meshes.write_ply(folder / f"{kind}.ply", mesh, cloud.origin_m)
+        meshes.write_ply(folder / f"{kind}.ply", mesh, origin_m)
     facts = summary.of_meshes(made["leaf"], made["wood"])
     del made
-    leaf_m = cloud.xyz_m[cloud.attributes["Classification"] == LEAF]
+    leaf_m = points_m["leaf"]
     used = polygon_sizes.resolved(leaf_m, settings)
     polygon_sizes.resolved(leaf_m, settings | {"voxel_size_m": polygon_sizes.AUTO})
     polygon_sizes.bracket(leaf_m, seed=1, **used)

@@ -11,19 +11,21 @@ def main(snakemake):
     settings = options(snakemake.params)
     correction, is_bracketed = settings.pop("correction"), settings.pop("bracket")
     cloud = clouds.read(snakemake.input.cloud)
-    made = steps.polygons(cloud, **settings)
+    points_m, origin_m = steps.points_by_kind(cloud), cloud.origin_m
+    del cloud  # a large one has no room beside its polygons
+    made = steps.polygons_of(points_m, **settings)
     leaves = made["leaf"]
     if correction:
         grid = as_estimated(voxel_grids.read(snakemake.input.voxels))
         leaves = occlusion.correct(leaves, grid, seed=settings["seed"], **correction)
-    meshes.write_ply(snakemake.output.leaves, leaves, cloud.origin_m)
-    meshes.write_ply(snakemake.output.wood, made["wood"], cloud.origin_m)
+    meshes.write_ply(snakemake.output.leaves, leaves, origin_m)
+    meshes.write_ply(snakemake.output.wood, made["wood"], origin_m)
     truth = json.read(snakemake.input.truth) if snakemake.input.truth else None
     facts = summary.of_meshes(leaves, made["wood"], truth)
     facts["n_added"] = leaves.n_elements - made["leaf"].n_elements
-    del leaves, made  # of a large cloud, the bracket has no room beside them
+    del leaves, made
     if is_bracketed:
-        leaf_m = cloud.xyz_m[cloud.attributes["Classification"] == clouds.LEAF]
+        leaf_m = points_m["leaf"]
         used = polygon_sizes.resolved(leaf_m, settings)
         areas = polygon_sizes.bracket(leaf_m, **used)
         fit = polygon_sizes.resolved(leaf_m, settings | {"voxel_size_m": polygon_sizes.AUTO})

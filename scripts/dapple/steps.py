@@ -65,12 +65,22 @@ def polygons(cloud: Cloud, *, seed: int, **settings: Any) -> dict[str, Mesh]:
     EmptyCloudError
         No point is leaf.
     """
+    return polygons_of(points_by_kind(cloud), seed=seed, **settings)
+
+
+def points_by_kind(cloud: Cloud) -> dict[str, np.ndarray]:
+    """Places (n, 3) of `leaf` and of `wood` [m]: beside them a large cloud need not be kept."""
     kinds = cloud.attributes["Classification"]
-    leaf_m = cloud.xyz_m[kinds == LEAF]
-    settings = polygon_sizes.resolved(leaf_m, settings)
-    leaf = reconstruct(leaf_m, what="leaf", seed=seed, **settings)
-    del leaf_m  # of a large cloud, wood has no room beside it
-    wood_m = cloud.xyz_m[kinds == WOOD]
+    return {"leaf": cloud.xyz_m[kinds == LEAF], "wood": cloud.xyz_m[kinds == WOOD]}
+
+
+def polygons_of(points_m: dict[str, np.ndarray], *, seed: int, **settings: Any) -> dict[str, Mesh]:
+    """`polygons` from what `points_by_kind` gives."""
+    settings = polygon_sizes.resolved(points_m["leaf"], settings)
+    leaf, wood_m = (
+        reconstruct(points_m["leaf"], what="leaf", seed=seed, **settings),
+        points_m["wood"],
+    )
     wood = reconstruct(wood_m, what="wood", seed=seed, **settings) if len(wood_m) else None
     return {"leaf": leaf, "wood": wood or mesh_files.empty()}
 

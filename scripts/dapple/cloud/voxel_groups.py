@@ -124,6 +124,7 @@ def slabs(columns: np.ndarray) -> Iterator[np.ndarray]:
     some = np.sort(columns[:: max(1, len(columns) // (1000 * n_slabs))])
     first = np.unique(some[np.arange(1, n_slabs) * len(some) // n_slabs])
     slab = np.searchsorted(first, columns, side="right").astype(np.int32)
+    del columns
     for k in range(len(first) + 1):
         chosen = np.flatnonzero(slab == k)
         if len(chosen):
