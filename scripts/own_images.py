@@ -13,8 +13,9 @@ def main(snakemake):
     crs = cloud_crs.horizontal(inputs.lidar, params["crs"])
     with laspy.open(inputs.lidar) as file:
         bounds_m = (*file.header.mins[:2], *file.header.maxs[:2])
+    images = inputs.images if isinstance(inputs.images, str) else list(inputs.images)
     found = user_rasters.read(
-        inputs.images, camera(params["bands"]).bands, crs=crs, bounds_m=bounds_m, **params["how"]
+        images, camera(params["bands"]).bands, crs=crs, bounds_m=bounds_m, **params["how"]
     )
     findings.say(found.findings)
     rasters.write(snakemake.output.images, found.raster)

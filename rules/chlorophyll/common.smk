@@ -36,8 +36,10 @@ def plot_file(path):
 
 
 def own(kind):
-    """The user's `lidar`, `images` or `crowns`, or nothing."""
+    """The user's `lidar`, `images` (perhaps several files) or `crowns`, or nothing."""
     path = getattr(CHLOROPHYLL.user, kind)
+    if "*" in path:
+        return data_files(path)
     return data(path) if path else []
 
 

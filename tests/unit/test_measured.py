@@ -121,6 +121,15 @@ def test_two_columns_for_one_sensor_need_a_pattern(tmp_path):
     assert read["par_umol_m2_s"].tolist() == [400]
 
 
+def test_the_one_of_a_unit_is_no_label(tmp_path):
+    path = tmp_path / "wide.csv"
+    path.write_text(
+        "time_utc,PAR 1 [µmol m-2 s-1],PAR 2 [µmol m-2 s-1]\n2023-08-10 10:00,300,400\n"
+    )
+    read = measured.read(path, sensors=places("1", "2")).table
+    assert read["par_umol_m2_s"].tolist() == [300, 400]
+
+
 def test_a_file_for_each_sensor_is_known_by_its_label_or_its_name(tmp_path):
     title = '"Plot Title: plot"\n"#","Date Time, GMT+01:00","PAR, uE (LGR S/N: 1, SEN S/N: 2'
     row = "1,08/13/23 01:10:00 PM,512.5\n2,08/13/23 01:20:00 PM,\n"

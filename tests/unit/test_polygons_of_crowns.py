@@ -185,3 +185,40 @@ def test_a_feature_that_gdal_cannot_parse_is_a_message(tmp_path):
     )
     with pytest.raises(InputError, match=r"crowns\.gml"):
         vectors.read(path)
+
+
+@pytest.mark.parametrize(
+    ("tree", "lcc"),
+    [
+        ("Tree_ID", "Cab"),
+        ("treeID", "LCC [ug cm-2]"),
+        ("TREE_NO", "Chl_ug"),
+        ("Baum", "chl_a_b"),
+        ("tag", "chlorophyll_content"),
+        ("crown_id", "lcc_mean"),
+    ],
+)
+def test_columns_are_known_by_what_people_call_them(tmp_path, tree, lcc):
+    squares = [shapely.box(5e5 + k, 5.3e6, 5e5 + k + 0.9, 5.3e6 + 1) for k in range(2)]
+    columns = {tree: [7.0, 8.0], lcc: [30.0, -9999.0], "SPAD": [40.0, 41.0], "lcc_sd": [1.0, 2.0]}
+    frame = geopandas.GeoDataFrame(columns, geometry=squares, crs="EPSG:25832")
+    frame.to_file(tmp_path / "crowns.gpkg")
+    read = vectors.read(tmp_path / "crowns.gpkg")
+    assert read.names == ("7", "8")
+    assert read.lcc_ug_cm2 == pytest.approx([30.0, np.nan], nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("columns", "message"),
+    [
+        ({"chl_upper": [30.0], "chl_lower": [40.0]}, "`crowns_lcc_column`"),
+        ({"chl_mg_m2": [300.0]}, "10 mg m⁻² are 1 µg"),
+    ],
+)
+def test_chlorophyll_in_several_columns_or_other_units_is_not_guessed(tmp_path, columns, message):
+    frame = geopandas.GeoDataFrame(
+        columns, geometry=[shapely.box(5e5, 5.3e6, 5e5 + 1, 5.3e6 + 1)], crs="EPSG:25832"
+    )
+    frame.to_file(tmp_path / "crowns.gpkg")
+    with pytest.raises(InputError, match=message):
+        vectors.read(tmp_path / "crowns.gpkg")

@@ -10,7 +10,7 @@ from rasterio.transform import Affine
 from rasterio.warp import calculate_default_transform, reproject
 
 from dapple.errors import InputError
-from dapple.formats import user_rasters
+from dapple.formats import raster_bands, user_rasters
 from dapple.formats.raster_bands import match
 
 GRID = Affine(0.1, 0, 612_000, 0, -0.1, 5_324_010)
@@ -282,3 +282,67 @@ def test_bands_without_names_whose_red_edge_outshines_the_infrared_are_in_anothe
         user_rasters.read(path, CAMERA)
     read = user_rasters.read(path, CAMERA, band_order=(1, 2, 3, 5, 4))
     np.testing.assert_allclose(medians(read), USUAL, rtol=0.05)
+
+
+# --- several files, other names -------------------------------------------------------------------
+
+
+def test_bands_in_files_of_their_own_are_brought_to_the_finest_pixels(tmp_path):
+    names = ("blue", "green", "red", "red_edge", "nir")
+    values = (leaves() * 1e4).astype("uint16")
+    paths = []
+    for k, name in enumerate(names):
+        step = 2 if k > 2 else 1
+        grid = Affine(0.1 * step, 0, 612_000, 0, -0.1 * step, 5_324_010)
+        band = values[k : k + 1, ::step, ::step]
+        paths.append(tiff(tmp_path / f"ortho_{name}.tif", band, names=None, grid=grid))
+    read = user_rasters.read(paths[::-1], CAMERA, scale=10_000)
+    assert read.raster.values.shape == values.shape
+    assert medians(read) == pytest.approx(USUAL, rel=0.05)
+    assert read.facts["bands"][CAMERA[4].name] == "ortho_nir"
+    assert "brought to pixels of 0.1 m" in " ".join(map(str, read.findings))
+    with pytest.raises(InputError, match="one band at 840 nm"):
+        user_rasters.read(paths[:4], CAMERA, scale=10_000)
+
+
+def test_a_file_beyond_the_others_covers_nothing(tmp_path):
+    near = tiff(tmp_path / "vis.tif", leaves()[:3], names=["Blue", "Green", "Red"])
+    far = tiff(tmp_path / "ir.tif", leaves()[3:], names=["Red edge", "NIR"],
+               grid=Affine(0.1, 0, 700_000, 0, -0.1, 5_324_010))  # fmt: skip
+    with pytest.raises(InputError, match="no data in band"):
+        user_rasters.read([near, far], CAMERA)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["Blau", "Grün", "Rot", "Rotkante", "Nahes Infrarot"],
+        ["B", "G", "R", "RE", "NIR"],
+        ["mean_blue", "mean_green", "mean_red", "mean_rededge", "mean_nir"],
+        ["bleu", "vert", "rouge", "red-edge", "proche infrarouge"],
+    ],
+)
+def test_colours_are_known_in_other_words(tmp_path, names):
+    order = [4, 2, 0, 3, 1]
+    path = tiff(tmp_path / "a.tif", leaves()[order], names=[names[k] for k in order])
+    read = user_rasters.read(path, CAMERA)
+    assert medians(read) == pytest.approx(USUAL, rel=0.02)
+
+
+def test_numbers_of_bands_are_no_colours(tmp_path):
+    path = tiff(tmp_path / "a.tif", leaves(), names=["B1", "B2", "B3", "B4", "B5"])
+    assert user_rasters.read(path, CAMERA).facts["bands_found"] == raster_bands.BY_ORDER
+
+
+def test_bands_that_are_dark_at_most_pixels_are_refused(tmp_path):
+    values = leaves()
+    values[:4, :, 10:] = 0.0
+    with pytest.raises(InputError, match="0 at half of the pixels"):
+        user_rasters.read(tiff(tmp_path / "a.tif", values), CAMERA)
+
+
+def test_a_system_that_is_on_no_map_is_refused(tmp_path):
+    local = rasterio.crs.CRS.from_wkt('LOCAL_CS["of the site",UNIT["metre",1]]')
+    path = tiff(tmp_path / "a.tif", leaves(), crs=local)
+    with pytest.raises(InputError, match="on no map"):
+        user_rasters.read(path, CAMERA, crs="EPSG:25832")

@@ -31,7 +31,11 @@ class OwnPlot(Section):
     """Your own plot: its files, and when they were taken."""
 
     lidar: str = key("", "LAS or LAZ of the plot, relative to data_dir")
-    images: str = key("", "reflectance as GeoTIFF, in any coordinate system, relative to data_dir")
+    images: str = key(
+        "",
+        "reflectance as GeoTIFF, in any coordinate system, relative to data_dir; a pattern with * "
+        "for bands in files of their own",
+    )
     band_order: tuple[Count, ...] = key(
         (), "number of the image's band for each of the camera; empty: by name, wavelength, colour"
     )

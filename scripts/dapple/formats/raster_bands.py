@@ -16,11 +16,11 @@ COLOURS_NM = {
 }
 """Where bands of these names lie."""
 WORDS = {
-    "rededge": r"red[\s_-]*edge|^re$",
-    "nir": r"near[\s_-]*infra[\s_-]*red|\bnir\b|^nir|infrared",
-    "blue": r"\bblue\b|^blue",
-    "green": r"\bgreen\b|^green",
-    "red": r"\bred\b|^red",
+    "rededge": r"red ?edge|rot ?kante|\bre\b|\bvre\b|\breg\b",
+    "nir": r"infra ?red|infra ?rot|infra ?rouge|infra ?rojo|\bnir\b|^n$",
+    "blue": r"\bblue|\bblau|\bbleu|\bazul|^b$",
+    "green": r"\bgreen|\bgrün|\bgruen|\bvert\b|\bverde|^g$",
+    "red": r"\bred\b|\brot\b|\brouge|\brojo|^r$",
 }
 WAVELENGTH_TAGS = ("wavelength", "central_wavelength", "centralwavelength", "center_wavelength",
                    "wavelength_nm", "centre_wavelength")  # fmt: skip
@@ -54,7 +54,9 @@ def wavelength_nm(description: str, tags: Mapping[str, str]) -> float | None:
 
 def colour(description: str) -> str | None:
     """The colour that a name tells, or None."""
-    text = description.lower().strip()
+    if re.fullmatch(r"[a-z]\d+", description.lower().strip()):
+        return None  # B5 is a number, not blue
+    text = " ".join(re.findall(r"[^\W\d_]+", description.lower()))
     return next((name for name, words in WORDS.items() if re.search(words, text)), None)
 
 

@@ -36,7 +36,7 @@ def reflectance(
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         For messages.
     values : (b, rows, columns) float64
     declared : float
@@ -75,12 +75,12 @@ def reflectance(
     return values, 1.0
 
 
-def check(path: Path, values: np.ndarray, camera: Sequence[CameraBand]) -> list[Finding]:
+def check(path: str | Path, values: np.ndarray, camera: Sequence[CameraBand]) -> list[Finding]:
     """Raise an InputError where values cannot be the reflectance of vegetation; tell doubts.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         For messages.
     values : (b, rows, columns) float64
         Reflectance, NaN without data.
@@ -96,12 +96,12 @@ def check(path: Path, values: np.ndarray, camera: Sequence[CameraBand]) -> list[
             )  # fmt: skip
         low, middle, high = np.percentile(there, (1, 50, 99))
         tops.append(high)
-        if low < LOWEST or high > LARGEST or middle > 1:
+        if low < LOWEST or high > LARGEST or not 0 < middle <= 1:
             raise InputError(
                 path,
                 f"reflectance of {low:.3g} to {high:.3g} (1 to 99 %) in band {band.name}, "
                 f"{middle:.3g} at half of the pixels",
-                f"{LOWEST:g} to {LARGEST:g}, and less than 1 at most pixels",
+                f"{LOWEST:g} to {LARGEST:g}, and between 0 and 1 at most pixels",
                 "Check `scale` and `nodata` of the plot.",
             )
     top = max(tops)
@@ -118,7 +118,7 @@ def check(path: Path, values: np.ndarray, camera: Sequence[CameraBand]) -> list[
     return [too_dim]
 
 
-def check_order(path: Path, values: np.ndarray, camera: Sequence[CameraBand]) -> None:
+def check_order(path: str | Path, values: np.ndarray, camera: Sequence[CameraBand]) -> None:
     """Raise an InputError where bands that only their order tells cannot be in it.
 
     Leaves reflect more of the near infrared than of the red edge. Cameras of MicaSense number the
@@ -126,7 +126,7 @@ def check_order(path: Path, values: np.ndarray, camera: Sequence[CameraBand]) ->
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         For messages.
     values : (b, rows, columns) float64
         Reflectance, NaN without data.

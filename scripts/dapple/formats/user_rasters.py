@@ -1,6 +1,7 @@
 """Images as people bring them: any grid, scale and order of bands, made into one kind of raster."""
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -46,7 +47,7 @@ class UserRaster:
 
 
 def read(
-    path: str | Path,
+    path: str | Path | Sequence[str | Path],
     camera: Sequence[CameraBand],
     *,
     crs: str = "",
@@ -60,8 +61,9 @@ def read(
 
     Parameters
     ----------
-    path : path
-        GeoTIFF or what else GDAL opens.
+    path : path or several
+        GeoTIFF or what else GDAL opens. Bands of several files are brought to the pixels of the
+        finest, and a file of one band is called after its name.
     camera : sequence of bands
         Name, centre and width of each band that is wanted.
     crs : str
@@ -84,67 +86,149 @@ def read(
         No such file, no raster, no coordinate system, bands that do not fit, no overlap, an image
         too large, or values that are no reflectance.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(path, "no file", "images", "Check the path in the configuration.")
+    paths = [Path(path)] if isinstance(path, str | Path) else [Path(one) for one in path]
+    for one in paths:
+        if not one.is_file():
+            raise InputError(one, "no file", "images", "Check the path in the configuration.")
+    where = str(paths[0]) if len(paths) == 1 else f"{paths[0]} and {len(paths) - 1} more"
     noticed: list[Finding] = []
+    gone: dict[str, float] = {}
+    factors: list[float | str] = []
+    layers: dict[int, np.ndarray] = {}
+    grid: tuple[Affine, int, int] | None = None
     try:
-        with rasterio.open(path) as file:
-            masks = _masks(file, len(camera))
-            spectral = [k for k in range(1, file.count + 1) if k not in masks]
-            texts = [file.descriptions[k - 1] or "" for k in spectral]
-            tags = [file.tags(k) for k in spectral]
+        with ExitStack() as stack:
+            files = [stack.enter_context(rasterio.open(one)) for one in paths]
+            bands = [band for file in files for band in _bands(file, len(camera), len(files))]
+            texts, tags = [band.text for band in bands], [band.tags for band in bands]
             order, how = raster_bands.match(
-                camera, texts, tags, order=band_order, where=path, hint=hint
+                camera, texts, tags, order=band_order, where=where, hint=hint
             )
-            chosen = [spectral[k] for k in order]
-            target = _target(path, file, crs)
-            empty = _nodata(file, chosen, nodata)
-            values, valid, transform = _read(path, file, chosen, masks, target, empty, bounds_m)
-            scales = np.array([file.scales[k - 1] for k in chosen])
-            offsets = np.array([file.offsets[k - 1] for k in chosen])
-            is_integer = np.issubdtype(file.dtypes[chosen[0] - 1], np.integer)
-            is_warped = not _fits(file, target)
-    except (rasterio.errors.RasterioError, UnicodeDecodeError) as error:
+            chosen = [bands[k] for k in order]
+            target = _target(paths[0], files[0], crs)
+            used = list(dict.fromkeys(band.file for band in chosen))
+            if len(used) > 1:  # the finest first
+                used.sort(key=lambda file: _pixel_m(file, target))
+            for file in used:
+                own = [k for k, band in enumerate(chosen) if band.file is file]
+                numbers = [chosen[k].number for k in own]
+                name = Path(file.name)
+                empty = _nodata(file, numbers, nodata)
+                masks = _masks(file, len(camera) if len(files) == 1 else 1)
+                if grid is None:
+                    values, valid, transform = _read(
+                        name, file, numbers, masks, target, empty, bounds_m
+                    )
+                    grid = (transform, values.shape[2], values.shape[1])
+                else:
+                    values, valid = _onto(file, numbers, masks, target, empty, grid)
+                    noticed.append(findings.note(name, f"brought to pixels of {transform.a:g} m"))
+                if not _fits(file, target):
+                    noticed.append(findings.note(name, f"images in {file.crs}, warped to {target}"))
+                kind = np.dtype(file.dtypes[numbers[0] - 1])
+                is_integer = np.issubdtype(kind, np.integer)
+                most = np.iinfo(kind).max if is_integer else None
+                values, missing = _without_data(values, valid, empty, most)
+                gone |= {text: max(share, gone.get(text, 0.0)) for text, share in missing.items()}
+                scales, offsets = (
+                    np.array([of_file[number - 1] for number in numbers])
+                    for of_file in (file.scales, file.offsets)
+                )
+                values, factor = raster_scale.reflectance(
+                    name, values, scale, scales, offsets, is_integer
+                )
+                factors.append(factor)
+                layers |= dict(zip(own, values, strict=True))
+    except (rasterio.errors.RasterioError, UnicodeDecodeError, pyproj.exceptions.CRSError) as error:
         raise InputError(
-            path, f"no readable raster ({error})", "a GeoTIFF", "Copy or export the file again."
-        ) from error
-    kind = np.dtype(file.dtypes[chosen[0] - 1])
-    values, gone = _without_data(values, valid, empty, np.iinfo(kind).max if is_integer else None)
+            where, f"no readable raster ({error})", "a GeoTIFF in a known coordinate system",
+            "Copy or export the file again.",
+        ) from error  # fmt: skip
+    values = np.stack([layers[k] for k in range(len(chosen))])
+    values = np.where(np.isfinite(values).all(axis=0), values, np.nan)
     if how == raster_bands.BY_ORDER:
         noticed.append(
             findings.warning(
-                path,
+                where,
                 f"{len(chosen)} bands without names",
                 f"bands {', '.join(band.name for band in camera)}",
                 "They are taken in this order; set `band_order` if it is another.",
             )
         )
-    if is_warped:
-        noticed.append(findings.note(path, f"images in {file.crs}, warped to {target}"))
     noticed += [
-        findings.note(path, f"{share:.1%} of pixels {text}") for text, share in gone.items()
+        findings.note(where, f"{share:.1%} of pixels {text}") for text, share in gone.items()
     ]
-    values, factor = raster_scale.reflectance(path, values, scale, scales, offsets, is_integer)
-    noticed += raster_scale.check(path, values, camera)
+    noticed += raster_scale.check(where, values, camera)
     if how == raster_bands.BY_ORDER:
-        raster_scale.check_order(path, values, camera)
+        raster_scale.check_order(where, values, camera)
     names = tuple(band.name for band in camera)
     raster = Raster(
         values.astype(np.float32), transform.c, transform.f, float(transform.a), target, names
     )
     facts = {
-        "path": str(path),
+        "path": where,
         "bands": {
-            band.name: texts[k] or str(spectral[k]) for band, k in zip(camera, order, strict=True)
+            band.name: one.text or str(one.number) for band, one in zip(camera, chosen, strict=True)
         },
         "bands_found": how,
         "crs": target,
         "pixel_m": raster.pixel_m,
-        "scale": factor,
+        "scale": factors[0] if len(set(factors)) == 1 else ", ".join(map(str, factors)),
         "without_data": gone,
     }
     return UserRaster(raster, tuple(noticed), facts)
+
+
+@dataclass(frozen=True)
+class _Band:
+    """A band of an open file, by its number from 1, with its name and metadata."""
+
+    file: rasterio.DatasetReader
+    number: int
+    text: str
+    tags: dict[str, str]
+
+
+def _bands(file: rasterio.DatasetReader, of_camera: int, files: int) -> list[_Band]:
+    """Bands of a file that are no mask; the only one of a file among several is called after it."""
+    masks = _masks(file, of_camera if files == 1 else 1)
+    numbers = [k for k in range(1, file.count + 1) if k not in masks]
+    stem = Path(file.name).stem if files > 1 and len(numbers) == 1 else ""
+    return [_Band(file, k, file.descriptions[k - 1] or stem, file.tags(k)) for k in numbers]
+
+
+def _pixel_m(file: rasterio.DatasetReader, target: str) -> float:
+    """Edge of a file's pixels in the target system [m]; infinite where it has no place."""
+    if file.crs is None:
+        return np.inf
+    with WarpedVRT(file, crs=target) as warped:
+        return float(warped.transform.a)
+
+
+def _onto(
+    file: rasterio.DatasetReader,
+    numbers: Sequence[int],
+    masks: Sequence[int],
+    target: str,
+    empty: Sequence[float],
+    grid: tuple[Affine, int, int],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Values (b, rows, columns) on another file's grid, and where masks allow them."""
+    if file.crs is None:
+        raise InputError(
+            file.name, "no coordinate system", "that of the other images",
+            "Assign it (gdal_edit.py -a_srs EPSG:…).",
+        )  # fmt: skip
+    transform, width, height = grid
+    with WarpedVRT(
+        file, crs=target, transform=transform, width=width, height=height,
+        resampling=Resampling.nearest, nodata=None if masks else _one(empty, file, numbers),
+    ) as source:  # fmt: skip
+        values = source.read(list(numbers), out_dtype=np.float64)
+        valid = (source.read_masks(list(numbers)) > 0).all(axis=0)
+        if masks:
+            valid &= (source.read(list(masks)) > 0).all(axis=0)
+    return values, valid
 
 
 def _masks(file: rasterio.DatasetReader, n_bands: int) -> list[int]:
@@ -169,9 +253,15 @@ def _target(path: Path, file: rasterio.DatasetReader, crs: str) -> str:
             "the one in which the images were made",
             "Assign it (gdal_edit.py -a_srs EPSG:…).",
         )
+    own = pyproj.CRS(file.crs.to_wkt())
+    if not own.is_projected and not own.is_geographic:
+        raise InputError(
+            path, f"the coordinate system '{own.name}', which is on no map",
+            "a projected or geographic one",
+            "Georeference the images, or assign their system (gdal_edit.py -a_srs EPSG:…).",
+        )  # fmt: skip
     if crs:
         return crs
-    own = pyproj.CRS(file.crs.to_wkt())
     # Feet are no metres, and the web's Mercator stretches them by the latitude.
     by = own.coordinate_operation.method_name if own.coordinate_operation else ""
     is_metric = own.axis_info and own.axis_info[0].unit_name == "metre"

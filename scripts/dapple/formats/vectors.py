@@ -14,13 +14,10 @@ import shapely
 from dapple import findings
 from dapple.errors import InputError
 from dapple.findings import Finding
+from dapple.formats import crown_columns
 from dapple.formats.atomic import atomic
 from dapple.formats.rasters import horizontal, same_crs
-from dapple.formats.table_numbers import parse
 
-TREE_NAMES = ("tree", "tree_id", "id", "name", "label")
-LCC_NAMES = ("lcc_ug_cm2", "lcc", "chlorophyll", "chl")
-LARGEST_LCC_UG_CM2 = 200.0
 GDAL_ERRORS = (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError)
 SIDECARS = (".dbf", ".shx")
 
@@ -117,11 +114,11 @@ def read(
     frame = _open(path, layer)
     frame, noticed = _polygons(path, frame)
     frame = frame.to_crs(_target(path, frame, crs))
-    names = _names(path, frame, tree_column, noticed)
+    names = crown_columns.names(path, frame, tree_column, noticed)
     return Crowns(
         tuple(map(_as_json, frame.geometry)),
         names,
-        _chlorophyll(path, frame, lcc_column, noticed),
+        crown_columns.chlorophyll(path, frame, lcc_column, noticed),
         _authority(frame.crs),
         tuple(noticed),
     )
@@ -310,66 +307,6 @@ def _target(path: Path, frame: geopandas.GeoDataFrame, crs: str) -> pyproj.CRS:
             "Reproject the crowns (ogr2ogr -t_srs).",
         )
     return horizontal(crs or frame.crs)
-
-
-def _names(
-    path: Path, frame: geopandas.GeoDataFrame, asked: str, noticed: list[Finding]
-) -> tuple[str, ...]:
-    column = _column(path, frame, asked, TREE_NAMES, "crowns_tree_column")
-    if column is None:
-        return tuple(str(number) for number in range(1, len(frame) + 1))
-    names = tuple(
-        str(number) if name is None else str(name)
-        for number, name in enumerate(frame[column], start=1)
-    )
-    if repeated := sorted({name for name in names if names.count(name) > 1}):
-        noticed.append(
-            findings.warning(
-                path, f"tree {repeated[0]} more than once", "each tree once",
-                "Both outlines are kept; join them where they are one crown.",
-            )
-        )  # fmt: skip
-    return names
-
-
-def _chlorophyll(
-    path: Path, frame: geopandas.GeoDataFrame, asked: str, noticed: list[Finding]
-) -> np.ndarray:
-    """Measured leaf chlorophyll (n,), NaN where it is not known [µg cm⁻²]."""
-    column = _column(path, frame, asked, LCC_NAMES, "crowns_lcc_column")
-    if column is None:
-        noticed.append(
-            findings.note(path, "no measured chlorophyll: the map is not held against trees")
-        )
-        return np.full(len(frame), np.nan)
-    texts = frame[column].map(lambda value: "" if value is None or value != value else str(value))
-    texts.index = range(1, len(texts) + 1)
-    where = f"{path}, property {column!r}"
-    decimal = "," if texts.str.contains(",").any() else "."
-    values = parse(texts, where, decimal=decimal).values
-    wrong = (values <= 0) | (values >= LARGEST_LCC_UG_CM2)
-    if wrong.any():
-        number = int(np.flatnonzero(wrong)[0])
-        raise InputError(
-            path,
-            f"{column} = {texts.iloc[number]} in feature {number + 1}",
-            f"leaf chlorophyll above 0 and below {LARGEST_LCC_UG_CM2:g}, in µg cm⁻²",
-            "Correct it, or leave the cell empty where it was not measured.",
-        )
-    return values
-
-
-def _column(
-    path: Path, frame: geopandas.GeoDataFrame, asked: str, usual: Sequence[str], key: str
-) -> str | None:
-    columns = {str(name).lower(): str(name) for name in frame.columns if name != "geometry"}
-    if asked:
-        if asked.lower() in columns:
-            return columns[asked.lower()]
-        raise InputError(
-            path, f"properties {', '.join(columns.values())}", f"`{asked}`", f"Correct `{key}`."
-        )
-    return next((columns[name] for name in usual if name in columns), None)
 
 
 def _as_json(shape: shapely.Geometry) -> dict:

@@ -243,7 +243,10 @@ def _is_par(source: Table, column: str) -> bool:
 
 def _is_of(name: str, label: str) -> bool:
     """Whether a column's or file's name holds a label as whole words: PAR_3_7_Avg holds 3_7."""
-    words, wanted = (re.findall(r"[^\W_]+", text.lower()) for text in (name, label))
+    # The 1 of a unit (s-1) is no label.
+    named = column_names.UNIT_IN_HEADER.match(name.strip())
+    bare = named["name"] if named and units.is_unit(named["unit"]) else name
+    words, wanted = (re.findall(r"[^\W_]+", text.lower()) for text in (bare, label))
     return any(
         words[k : k + len(wanted)] == wanted for k in range(len(words) - len(wanted) + 1)
     ) and bool(wanted)
