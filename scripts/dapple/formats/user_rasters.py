@@ -18,14 +18,10 @@ from rasterio.windows import Window
 from dapple import findings
 from dapple.errors import InputError
 from dapple.findings import Finding
-from dapple.formats import raster_bands, raster_scale
+from dapple.formats import raster_bands, raster_gaps, raster_scale
 from dapple.formats.raster_bands import CameraBand
 from dapple.formats.rasters import Raster, same_crs
 
-KNOWN_NODATA = (-10_000.0, -9999.0, -32_767.0, -32_768.0, -99_999.0, -3.4028234663852886e38)
-"""What programs write where an image has no data: no reflectance is so low."""
-BEYOND_ANY = 1e10
-"""So large a number is a flag."""
 MOST_VALUES = 400_000_000
 
 
@@ -113,7 +109,7 @@ def read(
                 own = [k for k, band in enumerate(chosen) if band.file is file]
                 numbers = [chosen[k].number for k in own]
                 name = Path(file.name)
-                empty = _nodata(file, numbers, nodata)
+                empty = raster_gaps.flags(file, numbers, nodata)
                 masks = _masks(file, len(camera) if len(files) == 1 else 1)
                 if grid is None:
                     values, valid, transform = _read(
@@ -128,7 +124,7 @@ def read(
                 kind = np.dtype(file.dtypes[numbers[0] - 1])
                 is_integer = np.issubdtype(kind, np.integer)
                 most = np.iinfo(kind).max if is_integer else None
-                values, missing = _without_data(values, valid, empty, most)
+                values, missing = raster_gaps.without_data(values, valid, empty, most)
                 gone |= {text: max(share, gone.get(text, 0.0)) for text, share in missing.items()}
                 scales, offsets = (
                     np.array([of_file[number - 1] for number in numbers])
@@ -279,15 +275,6 @@ def _fits(file: rasterio.DatasetReader, target: str) -> bool:
     return bool(is_square and same_crs(file.crs.to_string(), target))
 
 
-def _nodata(
-    file: rasterio.DatasetReader, chosen: Sequence[int], declared: float | None
-) -> list[float]:
-    """Values that mean no data: declared, the file's own, and known ones."""
-    own = [file.nodatavals[k - 1] for k in chosen if file.nodatavals[k - 1] is not None]
-    given = [declared] if declared is not None else []
-    return list(dict.fromkeys([*given, *map(float, own), *KNOWN_NODATA]))
-
-
 def _read(
     path: Path,
     file: rasterio.DatasetReader,
@@ -397,22 +384,3 @@ def _bound(path: Path, window: Window, n_bands: int) -> None:
             f"{MOST_VALUES:.0e} values at most",
             "Crop the images to the plot or make their pixels larger (gdalwarp -tr).",
         )
-
-
-def _without_data(
-    values: np.ndarray, valid: np.ndarray, empty: Sequence[float], largest: int | None
-) -> tuple[np.ndarray, dict[str, float]]:
-    """Values with NaN where there are none, and shares of pixels by reason."""
-    gone: dict[str, float] = {}
-    flagged = np.isin(values, list(empty)).any(axis=0) | ~(np.abs(values) < BEYOND_ANY).all(axis=0)
-    black = valid & ~flagged & (values == 0).all(axis=0)
-    white = valid & ~flagged & (values == largest).all(axis=0)
-    for text, missing in (
-        ("outside the image's mask", ~valid & ~flagged),
-        ("flagged as no data", flagged),
-        ("black in all bands, taken as no data", black),
-        ("as bright in all bands as the file can tell, taken as no data", white),
-    ):
-        if missing.any():
-            gone[text] = float(missing.mean())
-    return np.where(valid & ~flagged & ~black & ~white, values, np.nan), gone
