@@ -4,7 +4,7 @@
 
 Round leaves with spherical angles lie by chance in a cube of one metre, which four scanners around
 it meet with beams that have no width. The true area of a voxel of 0.2 m is that of the parts of
-leaves in it. `fpl with leaf area` is told the area of a leaf. Biases are those of the sum over all
+leaves in it. `fpl_with_leaf_area` is told the area of a leaf. Biases are those of the sum over all
 voxels that enough beams entered; `unseen` is the share of the true area in the others.
 """
 
@@ -53,7 +53,7 @@ def biases(leaf_area_index: float, size_m: float, seed: int) -> dict[str, float]
     )
     grid = Grid.around(np.array([[-0.5, -0.5, 1.0], [0.5, 0.5, 2.0]]), SIZE_M)
     found = {}
-    for told, area_m2 in (("", 0.0), (" with leaf area", np.pi * size_m**2 / 4)):
+    for told, area_m2 in (("", 0.0), ("_with_leaf_area", np.pi * size_m**2 / 4)):
         voxels = plant_area_density(
             shots, grid, single_leaf_area_m2=area_m2, max_pad_m2_m3=MAX_DENSITY
         )
