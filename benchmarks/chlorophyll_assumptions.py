@@ -1,10 +1,10 @@
 """What single assumptions of the retrieval do to chlorophyll, on plots that are there.
 
-    python benchmarks/chlorophyll_assumptions.py FOLDER [--seeds 401]
+    python benchmarks/chlorophyll_assumptions.py FOLDER [--seeds 402]
 
 FOLDER is that of `chlorophyll_plots.py run`. The traced light of its plots is used again with one
-assumption changed: the chance that scattered light meets its own shoot (from the prior, right,
-wrong), and the leaf model. Robust networks on collision orders of sunlit pixels are taught anew.
+assumption changed: the chance that scattered light meets its own shoot (right, wrong), the leaf
+model, and brown pigments. Robust networks on collision orders of sunlit pixels are taught anew.
 Writes docs/data/chlorophyll_assumptions.csv.
 """
 
@@ -53,6 +53,7 @@ def assumptions(species: str) -> dict[str, dict]:
         "shoots as single leaves: 0": shoots(0.0),
         "shoots as in Scots pine: 0.47": shoots(0.47),
         "the world's leaf model": {"prospect_version": "5"},
+        "brown pigments up to 0.8, as published": {"brown": (0.0, 0.8, 5)},
     }
 
 
@@ -87,7 +88,7 @@ def entries(settings: Settings, plot: Path, changed: dict) -> pd.DataFrame:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--seeds", type=int, nargs="+", default=[401, 402, 403, 404])
+    parser.add_argument("--seeds", type=int, nargs="+", default=plots.PLOT_SEEDS)
     given = parser.parse_args()
     rows = []
     for path in sorted(given.folder.glob("new-*.yaml")):

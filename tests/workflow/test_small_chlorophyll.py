@@ -1,6 +1,7 @@
 """The chlorophyll experiment in small: from a virtual forest to a map of leaf chlorophyll."""
 
 import json
+from importlib.util import find_spec
 
 import geopandas
 import numpy as np
@@ -79,6 +80,21 @@ def test_collision_orders_meet_direct_renders_within_the_noise_of_both(chlorophy
 def test_all_figures_are_drawn(chlorophyll):
     for name in ("map", "field", "simulated", "spectra", "losses"):
         assert chlorophyll.result(f"chlorophyll/larch_{name}.png").stat().st_size > 5_000
+
+
+@pytest.mark.long
+@pytest.mark.skipif(find_spec("less") is None, reason="less3d 3.0.0 is not installed")
+def test_the_same_world_seen_by_less_gives_the_same_map(chlorophyll, tmp_path):
+    other = chlorophyll.clone(tmp_path / "dapple")
+    path = "chlorophyll/map.tif"
+    target = other.result(path).relative_to(other.folder)
+    other.run(target, config=["chlorophyll={world: {renderer: less}}"])
+    one, two = (rasters.read(project.result(path)).values[0] for project in (chlorophyll, other))
+    assert not np.array_equal(one, two, equal_nan=True)
+    known = np.isfinite(one) & np.isfinite(two)
+    assert known.sum() >= 10
+    assert np.corrcoef(one[known], two[known])[0, 1] > 0.95
+    assert np.abs(one[known] - two[known]).mean() < 2.0
 
 
 # --- a plot of one's own --------------------------------------------------------------------------
