@@ -4,8 +4,8 @@
 
 FOLDER is that of `chlorophyll_plots.py run`. The traced light of its plots is used again with one
 assumption changed: the chance that scattered light meets its own shoot (right, wrong), the leaf
-model, and brown pigments. Robust networks on collision orders of sunlit pixels are taught anew.
-Writes docs/data/chlorophyll_assumptions.csv.
+model, brown pigments, and everything about leaves but chlorophyll at once. Robust networks on
+collision orders of sunlit pixels are taught anew. Writes docs/data/chlorophyll_assumptions.csv.
 """
 
 import argparse
@@ -19,6 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
 import chlorophyll_plots as plots
 
+from dapple.config.chlorophyll import World
 from dapple.config.settings import Settings
 from dapple.formats import json, rasters
 from dapple.optics.cameras import ZHAO
@@ -27,6 +28,8 @@ from training_set import images
 
 TRUE_SHOOTS = {"larch": 0.06, "spruce": 0.23}
 """Found with rays (tests/physics/test_shoots.py)."""
+LEAF = ("dry_matter_g_cm2", "brown", "water_cm", "chlorophyll_per_carotenoid")
+"""Of the world: mean and standard deviation between trees."""
 RANGES = (
     "n",
     "chlorophyll_ug_cm2",
@@ -41,19 +44,23 @@ RANGES = (
 )
 
 
-def assumptions(species: str) -> dict[str, dict]:
+def assumptions(species: str, world: World) -> dict[str, dict]:
     """What is changed in the settings of the retrieval, by name."""
 
     def shoots(chance: float) -> dict:
         return {"shoot_recollision": (chance, chance, 1)}
 
     true = TRUE_SHOOTS[species]
+    means = {"n": world.needle_structure[0]}
+    means |= {name: getattr(world, name)[0] for name in LEAF}
+    leaves = {name: (mean, mean, 1) for name, mean in means.items()}
     return {
         f"shoots as they are: {true:g}": shoots(true),
         "shoots as single leaves: 0": shoots(0.0),
         "shoots as in Scots pine: 0.47": shoots(0.47),
         "the world's leaf model": {"prospect_version": "5"},
-        "brown pigments up to 0.8, as published": {"brown": (0.0, 0.8, 5)},
+        "brown pigments up to 0.8 as published": {"brown": (0.0, 0.8, 5)},
+        "the world's leaves but for chlorophyll": leaves | shoots(true) | {"prospect_version": "5"},
     }
 
 
@@ -96,7 +103,7 @@ def main() -> None:
         if settings.seed not in given.seeds or not path.with_suffix(".csv").is_file():
             continue
         plot = results / "plots" / species
-        for name, changed in assumptions(species).items():
+        for name, changed in assumptions(species, settings.chlorophyll.world).items():
             found = plots.taught(entries(settings, plot, changed), settings, robust=True)
             row = {"species": species, "assumption": name}
             rows.append(row | plots.field(*found, plot, "sunlit"))

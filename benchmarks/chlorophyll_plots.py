@@ -8,7 +8,9 @@ its configuration to FOLDER and runs the workflow up to the training sets; resul
 `results/new-SPECIES-SEED`. Then it teaches ten networks of every kind on them and compares what
 they retrieve with the trees, into a table in FOLDER. A plot whose table is there is left out.
 `table` puts the tables together: docs/data/chlorophyll_plots.csv, a row for each plot, model, mask
-and kind of network; and chlorophyll_costs.csv, what the steps of a plot cost.
+and kind of network; chlorophyll_by_plot.csv, the same with models and networks side by side;
+chlorophyll_models.csv, over the plots of a species; and chlorophyll_costs.csv, what the steps of a
+plot cost.
 
 Plots are smaller than those of Zhao et al. (2025), with coarser images, fewer combinations and
 narrower networks, so that many plots and ten networks each can be run on two cores.
@@ -204,6 +206,46 @@ def field(
     }
 
 
+def by_plot(table: pd.DataFrame) -> pd.DataFrame:
+    """RMSE and bias of every model and kind of network, in a row for each plot and mask."""
+    of_plot = ["species", "plot_seed", "mask"]
+    wide = table.pivot(index=of_plot, columns=["model", "network"], values=["rmse", "bias"])
+    wide.columns = [f"{model}_{network}_{value}" for value, model, network in wide.columns]
+    trees = table.groupby(of_plot)[["trees", "truth_mean", "truth_sd"]].first()
+    return trees.join(wide).reset_index()
+
+
+def over_plots(table: pd.DataFrame) -> pd.DataFrame:
+    """What a model, mask and kind of network does on all plots of a species.
+
+    RMSE, bias, R² and coverage are those of all trees, R² against the mean of each plot's own.
+    """
+    table = table.assign(
+        squares=table.trees * table.rmse**2,
+        spread=table.trees * table.truth_sd**2,
+        deviations=table.trees * table.bias,
+        held=table.trees * table.coverage,
+    )
+    groups = table.groupby(["species", "mask", "model", "network"], sort=False)
+    sums = groups[["trees", "squares", "spread", "deviations", "held"]].sum()
+    found = pd.DataFrame(
+        {
+            "plots": groups.size(),
+            "trees": sums.trees,
+            "truth_sd": np.sqrt(sums.spread / sums.trees),
+            "rmse": np.sqrt(sums.squares / sums.trees),
+            "rmse_low": groups.rmse.min(),
+            "rmse_high": groups.rmse.max(),
+            "bias": sums.deviations / sums.trees,
+            "r2": 1 - sums.squares / sums.spread,
+            "coverage": sums.held / sums.trees,
+            "network_rmse_sd": groups.network_rmse_sd.mean(),
+            "simulated_rmse": groups.simulated_rmse.mean(),
+        }
+    )
+    return found.reset_index()
+
+
 def costs(paths: list[Path]) -> pd.DataFrame:
     """Processor seconds and peak memory of every step, means over the plots of a species."""
     rows = []
@@ -230,7 +272,12 @@ def main() -> None:
     scored = sorted(given.folder.glob("new-*.csv"))
     table = pd.concat([pd.read_csv(path) for path in scored])
     plots = [path.with_suffix(".yaml") for path in scored]
-    made = {"plots": table, "costs": costs(plots)}
+    made = {
+        "plots": table,
+        "by_plot": by_plot(table),
+        "models": over_plots(table),
+        "costs": costs(plots),
+    }
     for name, one in made.items():
         one.to_csv(DATA / f"chlorophyll_{name}.csv", index=False, float_format="%.5g")
     print(table.round(2).to_string(index=False))
