@@ -177,6 +177,17 @@ def test_an_error_in_r_names_the_function(tmp_path):
         r_bridge.call(tmp_path / "broken.R", "f")
 
 
+def test_r_code_that_finds_no_end_is_stopped_and_the_next_call_has_all_its_time(tmp_path):
+    source = tmp_path / "slow.R"
+    source.write_text(
+        "f <- function() repeat sqrt(2)\n"
+        "g <- function() {Sys.sleep(0.6); for (k in 1:1e5) sqrt(k); data.frame(done = 1)}"
+    )
+    with pytest.raises(InputError, match=r"slow.R: f\(\).*elapsed time limit"):
+        r_bridge.call(source, "f", limit_s=0.3)
+    assert r_bridge.call(source, "g")["done"].item() == 1
+
+
 def test_a_missing_r_package_is_named_with_the_remedy():
     with pytest.raises(InputError, match=r"R without notapackage.*apt-get install"):
         r_bridge.call(correlation.R_FILE, "mixed_model", packages=("notapackage",))

@@ -15,10 +15,19 @@ REMEDY = (
     "conda: the packages r-base, r-boot and r-lme4."
 )
 
+LIMIT_S = 3600.0
+"""Time that a function gets: many times what a fit or thousands of replicates take [s]."""
+
 log = logging.getLogger(__name__)
 
 
-def call(r_file: str | Path, function: str, *arguments: Any, packages: tuple[str, ...] = ()):
+def call(
+    r_file: str | Path,
+    function: str,
+    *arguments: Any,
+    packages: tuple[str, ...] = (),
+    limit_s: float = LIMIT_S,
+) -> pd.DataFrame:
     """Run one function of an R file.
 
     Parameters
@@ -31,6 +40,8 @@ def call(r_file: str | Path, function: str, *arguments: Any, packages: tuple[str
         Passed by position; a DataFrame becomes a `data.frame`.
     packages : tuple of str
         R packages that the function needs.
+    limit_s : float
+        R ends the function after this time [s].
 
     Returns
     -------
@@ -40,7 +51,8 @@ def call(r_file: str | Path, function: str, *arguments: Any, packages: tuple[str
     Raises
     ------
     InputError
-        R or one of the packages is missing, or the R function stopped with an error.
+        R or one of the packages is missing, or the R function stopped with an error or took too
+        long.
     RuntimeError
         Called outside the main thread: R keeps one stack and crashes on another.
     """
@@ -58,6 +70,7 @@ def call(r_file: str | Path, function: str, *arguments: Any, packages: tuple[str
     robjects.r["eval"](source, environment)
     with localconverter(default_converter + pandas2ri.converter):
         try:
+            robjects.r["setTimeLimit"](elapsed=limit_s)
             result = environment[function](*map(_plain, arguments))
         except RRuntimeError as error:
             raise InputError(
@@ -66,6 +79,8 @@ def call(r_file: str | Path, function: str, *arguments: Any, packages: tuple[str
                 "records that the model can be fitted to",
                 "Look at the records: enough sensors, finite numbers, values that vary.",
             ) from error
+        finally:
+            robjects.r["setTimeLimit"]()
     if not isinstance(result, pd.DataFrame):
         raise TypeError(f"{function}() returned {type(result).__name__}, not a data.frame")
     return result
