@@ -2,11 +2,14 @@
 
 It runs in two fresh folders, with one core and with two, and every result is compared by its
 checksum. Left out is what tells the time: benchmarks, logs, tables of seconds, and the pages and
-pictures that show them. Then the results are held against `docs/data/checksums.csv`, which has, for
-every platform on which it was written, the checksum of each result, how many numbers it holds, the
-geometric mean of their magnitudes, their root mean square, and how far these may move as a share of
-themselves. After a dependency was updated, and on a platform that the table does not have, it names
-the results that moved, and the rules that moved while nothing before them in the rule graph did.
+pictures that show them; they are not made. Then the results are held against
+`docs/data/checksums.csv`, which has, for every platform on which it was written, the checksum of
+each result, how many numbers it holds, the geometric mean of their magnitudes, their root mean
+square, and how far these may move as a share of themselves. After a dependency was updated, and on
+a platform that the table does not have, it names the results that moved, and the rules that moved
+while nothing before them in the rule graph did.
+
+`--folder` keeps the runs; asked again with it, a run that was broken off goes on.
 
 `--write` renews the rows of this platform. Tolerances are measured then: a third run makes NumPy,
 OpenBLAS and Numba compute as on an older processor, and a result may move ten times as far.
@@ -20,6 +23,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -57,15 +61,15 @@ def this_platform() -> str:
     return f"{platform.system()} {platform.machine()}{width}, Python {python}"
 
 
-def compared(folder: Path) -> list[Path]:
-    """Results that do not tell the time, relative to their folder."""
-    found = (path.relative_to(folder) for path in sorted(folder.rglob("*")) if path.is_file())
-    return [path for path in found if path.parts[0] not in TELL_THE_TIME]
+def compared(names: Iterable[Path]) -> list[Path]:
+    """Those of the results, relative to their folder, that do not tell the time."""
+    return [name for name in names if name.parts[0] not in TELL_THE_TIME]
 
 
 def checksums(folder: Path) -> dict[str, str]:
     """SHA-256 of every result that does not tell the time, by its path in the folder."""
-    return {str(path): sha256(folder / path) for path in compared(folder)}
+    found = (path.relative_to(folder) for path in sorted(folder.rglob("*")) if path.is_file())
+    return {str(path): sha256(folder / path) for path in compared(found)}
 
 
 def numbers(path: Path) -> np.ndarray:
@@ -83,7 +87,8 @@ def _arrays(path: Path) -> Iterator[Any]:
     elif path.suffix == ".nc":
         with xr.open_dataset(path, decode_times=False) as dataset:
             for variable in dataset.variables.values():
-                if variable.dtype.kind in "iuf":
+                # uint64: checksums of what was traced, of which no digit means much or little
+                if variable.dtype.kind in "iuf" and variable.dtype != np.uint64:
                     yield variable.to_numpy()
     elif path.suffix == ".laz":
         cloud = laspy.read(path)
@@ -213,19 +218,23 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     options.add_argument("--experiment", default="virtual-apple-small", help="of config/")
     options.add_argument("--write", action="store_true", help="renew the rows of this platform")
+    options.add_argument("--folder", type=Path, help="keep the runs here")
     asked = options.parse_args()
     configured = ["--configfile", str(ROOT / f"config/{asked.experiment}.yaml")]
     known = pd.read_csv(TABLE) if TABLE.exists() else pd.DataFrame(columns=KEY)
     here = (known["platform"] == this_platform()) & (known["experiment"] == asked.experiment)
     of_rules = snakemake(ROOT, *arguments(asked.experiment))
     pairs = arrows(of_rules)
-    with tempfile.TemporaryDirectory(prefix="reproduce-") as scratch:
+    kept = nullcontext(asked.folder.resolve()) if asked.folder else None
+    with kept or tempfile.TemporaryDirectory(prefix="reproduce-") as scratch:
 
         def run(name: str, cores: int, **variables: str) -> pd.DataFrame:
             folder = Path(scratch, name)
-            snakemake(folder, "--quiet", "all", *configured, cores=cores, **variables)
             rule_of = rules_of_results(folder, configured, asked.experiment)
-            return described(folder / "results" / asked.experiment, asked.experiment, rule_of)
+            results = Path("results", asked.experiment)
+            wanted = (str(results / name) for name in compared(map(Path, rule_of)))
+            snakemake(folder, *wanted, "--quiet", "all", *configured, cores=cores, **variables)
+            return described(folder / results, asked.experiment, rule_of)
 
         one, two = run("one core", 1), run("two cores", 2)
         print(f"{len(one)} results on {this_platform()}")

@@ -75,7 +75,10 @@ def test_numbers_of_every_format_count(tmp_path):
     assert reproduce.numbers(tmp_path / "t.parquet").tolist() == [3.0]
     dataset = table[["x"]].rename_axis("row").to_xarray()
     dataset["x"].attrs = {"units": "m", "long_name": "place"}
+    dataset["identity"] = "row", np.array([2**63, 1], np.uint64), {"units": "1", "long_name": "sum"}
     netcdf.write(tmp_path / "t.nc", dataset)
-    assert 3.0 in reproduce.numbers(tmp_path / "t.nc")
+    found = reproduce.numbers(tmp_path / "t.nc")
+    assert 3.0 in found
+    assert 2.0**63 not in found  # a checksum
     assert reproduce.measures(tmp_path / "t.parquet") == {
         "numbers": 1, "geometric_mean": pytest.approx(3), "rms": pytest.approx(3)}  # fmt: skip
