@@ -5,7 +5,8 @@
 Round leaves with spherical angles lie by chance in a cube of one metre, which four scanners around
 it meet with beams that have no width. The true area of a voxel of 0.2 m is that of the parts of
 leaves in it. `fpl_with_leaf_area` is told the area of a leaf. Biases are those of the sum over all
-voxels that enough beams entered; `unseen` is the share of the true area in the others.
+voxels that enough beams entered, means over cubes, more of them where leaves are few; `unseen` is
+the share of the true area in the others.
 """
 
 import argparse
@@ -25,7 +26,9 @@ from dapple.structure.voxel_sums import Grid  # noqa: E402
 from dapple.structure.voxels import plant_area_density  # noqa: E402
 from dapple.virtual import scanner  # noqa: E402
 
-INDICES, SIZES_M, SEEDS = (0.5, 1.0, 2.0, 4.0, 8.0), (0.01, 0.03, 0.08, 0.15), (1,)
+INDICES = (0.5, 1.0, 2.0, 4.0, 8.0)
+CUBES = {0.01: 1, 0.03: 2, 0.08: 12, 0.15: 24}
+"""By the size of leaves [m]."""
 STEP_DEG, MAX_DENSITY = 0.15, 40.0
 
 
@@ -68,12 +71,12 @@ def biases(leaf_area_index: float, size_m: float, seed: int) -> dict[str, float]
     return found
 
 
-def table(indices=INDICES, sizes_m=SIZES_M, seeds=SEEDS) -> pd.DataFrame:
-    """Means over the seeds."""
+def table() -> pd.DataFrame:
+    """Means over the cubes."""
     rows = []
-    for index in indices:
-        for size_m in sizes_m:
-            found = pd.DataFrame([biases(index, size_m, seed) for seed in seeds]).mean()
+    for index in INDICES:
+        for size_m, n in CUBES.items():
+            found = pd.DataFrame([biases(index, size_m, seed) for seed in range(1, n + 1)]).mean()
             rows.append({"leaf_area_index": index, "leaf_size_m": size_m, **found})
             print(rows[-1], flush=True)
     return pd.DataFrame(rows)

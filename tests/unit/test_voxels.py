@@ -8,7 +8,7 @@ from dapple.errors import InputError, MissingMissesError
 from dapple.formats import voxel_grids as files
 from dapple.formats.meshes import Mesh
 from dapple.formats.shots import Shots
-from dapple.structure import leaf_angles, summary
+from dapple.structure import leaf_angles, summary, voxel_sums
 from dapple.structure.returns import kinds_by_place
 from dapple.structure.voxel_sums import Grid, accumulate
 from dapple.structure.voxels import estimate, plant_area_density
@@ -255,13 +255,19 @@ def leaves_by_chance(distribution, beam_zenith, n_leaves, area_m2, n_shots, rng)
     return shots_of(origin, direction, ranges)
 
 
+def leaves_lie_wholly_in_a_voxel(monkeypatch):
+    """No voxel cuts a leaf."""
+    monkeypatch.setattr(voxel_sums, "part_of_leaf", lambda area_m2, size_m: area_m2)
+
+
 @pytest.mark.parametrize(
     ("distribution", "beam_zenith_deg"), [("spherical", 30), ("planophile", 0), ("erectophile", 0)]
 )
 def test_few_large_leaves_have_their_density_with_their_own_area_alone(
-    distribution, beam_zenith_deg
+    distribution, beam_zenith_deg, monkeypatch
 ):
     """Seven leaves of 0.3 m² in a cubic metre, G from 0.42 to 0.85; half or twice the area errs."""
+    leaves_lie_wholly_in_a_voxel(monkeypatch)
     rng = np.random.default_rng(8)
     shots = leaves_by_chance(distribution, np.radians(beam_zenith_deg), 7, 0.3, 12_000, rng)
 
@@ -277,12 +283,31 @@ def test_few_large_leaves_have_their_density_with_their_own_area_alone(
     assert density(0.6)[0] < 2.1 - 2 * error
 
 
-def test_half_of_amapvox_s_leaf_area_gives_amapvox_s_effective_path():
+def test_half_of_amapvox_s_leaf_area_gives_amapvox_s_effective_path(monkeypatch):
     """It takes λ₁ = 0.25·area/V: given 0.4 m², 0.1 per metre."""
+    leaves_lie_wholly_in_a_voxel(monkeypatch)
     result = plant_area_density(TWO_SHOTS, column(1), min_shots=1, single_leaf_area_m2=0.4 / 2)
     z = -np.log(1 - 0.1 * np.array([0.5, 1.0])) / 0.1
     expected = (1 / 3) / (z[0] / 3 + z[1] * 2 / 3 + z[1])
     assert 0.5 * in_column(result, "pad_fpl_biased_m2_m3")[0] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("radius_m", [0.01, 0.1, 0.3])
+def test_parts_of_leaves_are_those_into_which_voxels_cut_discs(radius_m):
+    """Mean area of the parts in voxels of half a metre, each counted by its area."""
+    rng = np.random.default_rng(1)
+    normal, across = rng.standard_normal((2, 400, 3))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    across = np.cross(normal, across)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    out, turn = radius_m * np.sqrt(rng.random((400, 400))), 2 * np.pi * rng.random((400, 400))
+    plane = np.stack([across, np.cross(normal, across)], 1)
+    inside = np.stack([out * np.cos(turn), out * np.sin(turn)], -1) @ plane
+    cells = np.floor((inside + rng.random((400, 1, 3))) / 0.5).astype(int)
+    flat = np.ravel_multi_index(tuple(np.moveaxis(cells + 4, -1, 0)), (12, 12, 12))
+    of_area = np.mean([(np.bincount(one) ** 2).sum() / 400**2 for one in flat])
+    area_m2 = np.pi * radius_m**2
+    assert voxel_sums.part_of_leaf(area_m2, 0.5) == pytest.approx(area_m2 * of_area, rel=0.05)
 
 
 def test_a_leaf_that_could_fill_a_voxel_is_refused():

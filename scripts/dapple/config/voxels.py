@@ -30,7 +30,7 @@ class Voxels(Section):
     leaf_angle_distribution: LeafAngles = key("spherical", "of the leaf normals", FREY)
     single_leaf_area_m2: NotNegative = key(
         0.0,
-        "one-sided, for the finite-element correction (half of AMAPVox's number); 0: none",
+        "one-sided, for the finite-element correction by the parts of leaves in a voxel; 0: none",
         "Pimont et al. 2018",
     )
     max_pad_m2_m3: Positive = key(5.0, "cap of plant area density", "AMAPVox")

@@ -120,11 +120,11 @@ def accumulate(
     single_leaf_area_m2 : float
         One-sided area s of a leaf, for the finite-element correction of free paths in the
         estimators `fpl` and `fpl_biased`; 0, the default: no correction. A path z counts as
-        -ln(1 - λ₁z)/λ₁ with λ₁ = G·s/V for a voxel of volume V (derived in
-        `traversal._effective`; Pimont et al. 2018). AMAPVox takes λ₁ = 0.25/V times the area that
-        it is given: half its number gives the same answer here with spherical leaf angles. The
-        area is that of the mean element that a beam can tell from others: where leaves are folded
-        or lie against each other, no measured leaf area stands for it, hence the default.
+        -ln(1 - λ₁z)/λ₁ with λ₁ = G·s/V for elements of area s in a voxel of volume V (derived in
+        `traversal._effective`; Pimont et al. 2018), which are the parts of leaves that lie in it
+        (`part_of_leaf`). AMAPVox takes λ₁ = 0.25/V times the area that it is given, as if leaves
+        lay wholly in a voxel. Where leaves are folded or lie against each other, no measured leaf
+        area stands for what a beam can tell apart, hence the default.
     max_pad_m2_m3 : float
         Cap of plant area density.
     contact_voxel_m : float
@@ -180,7 +180,7 @@ def accumulate(
             np.array(grid.shape, np.int64),
             float(grid.size_m),
             beam,
-            single_leaf_area_m2 / grid.size_m**3,
+            part_of_leaf(single_leaf_area_m2, grid.size_m) / grid.size_m**3,
             u_max,
             n_parts,
             visits,
@@ -218,6 +218,22 @@ def accumulate(
         len(scans),
         world_origin_m,
         settings,
+    )
+
+
+def part_of_leaf(leaf_area_m2: float, size_m: float) -> float:
+    """Mean area of the parts into which voxels cut a round leaf, each counted by its area [m²].
+
+    Elements of areas a leave a path z free with Π(1 - G·a·z/V), whose logarithm is to second order
+    that of equal elements of Σa²/Σa. The sum of squares of a leaf's parts is its area squared times
+    the chance that two of its points share a voxel, Π(1 - |Δₖ|/size), with Δ the way from one to
+    the other: any direction, and lengths whose moments are those of two points in a disc (Solomon
+    1978, Geometric Probability).
+    """
+    x = math.sqrt(leaf_area_m2 / math.pi) / size_m
+    mean, mean_of_cubes = 128 / (45 * math.pi), 2048 / (525 * math.pi)  # of squares: 1
+    return leaf_area_m2 * (
+        1 - 1.5 * mean * x + 2 / math.pi * x**2 - mean_of_cubes / (4 * math.pi) * x**3
     )
 
 
