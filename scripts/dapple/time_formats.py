@@ -18,8 +18,6 @@ CLEAR = (
     "%Y%m%d %H:%M:%S",
     "%Y%m%d %H%M",
     "%Y%m%d %H%M%S",
-    "%Y/%m/%d %H:%M",
-    "%Y/%m/%d %H:%M:%S",
     "%d.%m.%Y %H:%M",
     "%d.%m.%Y %H:%M:%S",
     "%d.%m.%y %H:%M",
@@ -30,8 +28,6 @@ CLEAR = (
     "%Y-%m-%d %H.%M.%S",
     "%Y-%m-%d %I:%M %p",
     "%Y-%m-%d %I:%M:%S %p",
-    "%Y/%m/%d %I:%M %p",
-    "%Y/%m/%d %I:%M:%S %p",
     "%d.%m.%Y %I:%M %p",
     "%d.%m.%Y %I:%M:%S %p",
     "%Y%m%d%H",
@@ -55,6 +51,8 @@ DAY_FIRST, MONTH_FIRST = (
     [f"{date}{year} {clock}" for clock in CLOCKS for year in ("%Y", "%y")]
     for date in ("%d/%m/", "%m/%d/")
 )
+YEAR_FIRST = [f"%y/%m/%d {clock}" for clock in CLOCKS]
+YEAR_BEFORE = r"^(\d{4})[-./](\d\d?)[-./](\d\d?)[ _](\d\d?)(?=[:. \d]|$)"
 MONTHS = {
     "Jan": "january januar jänner janvier janv enero ene gennaio gen januari janeiro",
     "Feb": "february februar feber fevrier février févr fevr febrero febbraio februari fevereiro "
@@ -108,6 +106,7 @@ def naive(text: pd.Series, where: str, time_format: str = "") -> pd.DatetimeInde
     plain = plain.str.replace(r"\s*Uhr$", "", regex=True)
     plain = plain.str.replace(r"[^\W\d_]{3,}\.?", _in_english, regex=True)
     plain = plain.str.replace(WEEKDAY, "", regex=True).str.upper()
+    plain = plain.str.replace(YEAR_BEFORE, _in_full, regex=True)
     plain, next_day = _midnights(plain)
     way, found = _first_of([ISO, *CLEAR], plain)
     if way.startswith("%d.%m."):
@@ -115,7 +114,10 @@ def naive(text: pd.Series, where: str, time_format: str = "") -> pd.DatetimeInde
     if found is None:
         # 8/10/2023, 8-10-2023 and 8.10.2023: which is the day?
         slashed = plain.str.replace(r"^(\d\d?)[-.](\d\d?)[-.](\d{2,4})", r"\1/\2/\3", regex=True)
-        found = _day_or_month(slashed, where)
+        orders = [DAY_FIRST, MONTH_FIRST]
+        if plain.str.match(r"\d\d-\d\d-\d\d ").all():
+            orders.append(YEAR_FIRST)
+        found = _day_or_month(slashed, where, orders)
     if found is None:
         raise _no_time(text, plain, where)
     return pd.DatetimeIndex(found) + pd.to_timedelta(next_day.to_numpy().astype(int), unit="D")
@@ -124,6 +126,12 @@ def naive(text: pd.Series, where: str, time_format: str = "") -> pd.DatetimeInde
 def _in_english(match: re.Match[str]) -> str:
     """The month that a word is, in three letters; 10. is 10 before it."""
     return MONTH_OF.get(match[0].lower().rstrip("."), match[0])
+
+
+def _in_full(match: re.Match[str]) -> str:
+    """A day with its year before it as ISO 8601 has it, and two digits of the hour."""
+    year, month, day, hour = match.groups()
+    return f"{year}-{month:0>2}-{day:0>2} {hour:0>2}"
 
 
 def _by_steps(text: pd.Series, way: str, by_day: pd.Series | None) -> pd.Series | None:
@@ -161,7 +169,8 @@ def _declared(text: pd.Series, where: str, time_format: str) -> pd.DatetimeIndex
 
 def _midnights(text: pd.Series) -> tuple[pd.Series, pd.Series]:
     """24:00 as 00:00, and whether a row was so."""
-    is_24 = text.str.contains(r"(?:^|\D|\d{8})24:?00(?::?00)?$", regex=True)
+    # Behind a day: in 11:24:00 the 24 are minutes.
+    is_24 = text.str.contains(r"(?:^|[^\d:.]|^\d{8}:?)24:?00(?::?00)?$", regex=True)
     plain = text.where(~is_24, text.str.replace(r"24(:?00(?::?00)?)$", r"00\1", regex=True))
     return plain, is_24
 
@@ -180,21 +189,25 @@ def _first_of(formats: list[str], text: pd.Series) -> tuple[str, pd.Series | Non
     return "", None
 
 
-def _day_or_month(text: pd.Series, where: str) -> pd.Series | None:
-    """The one order of day and month in which the rows are times, steps considered."""
-    by_day, day = _first_of(DAY_FIRST, text)
-    by_month, month = _first_of(MONTH_FIRST, text)
-    if day is None or month is None or day.equals(month):
-        return month if day is None else day
-    longest = [times.sort_values().diff().max() for times in (day, month)]
-    if min(longest) <= A_GAP < max(longest):
-        return day if longest[0] < longest[1] else month
+def _day_or_month(text: pd.Series, where: str, orders: list[list[str]]) -> pd.Series | None:
+    """The one order of day, month and year in which rows are times, steps considered."""
+    found: list[tuple[str, pd.Series]] = []
+    for order in orders:
+        way, times = _first_of(order, text)
+        if times is not None and not any(times.equals(other) for _, other in found):
+            found.append((way, times))
+    close = [one for one in found if one[1].sort_values().diff().max() <= A_GAP]
+    if len(found) < 2 or len(close) == 1:
+        chosen = found if len(found) < 2 else close
+        return chosen[0][1] if chosen else None
+    ways = " or ".join(f"'{way}'" for way, _ in found)
     raise InputError(
         where,
-        f"{text.iloc[0]}, which may be {day.iloc[0]:%d %B %Y} or {month.iloc[0]:%d %B %Y}",
+        f"{text.iloc[0]}, which may be "
+        + " or ".join(f"{times.iloc[0]:%d %B %Y}" for _, times in found),
         "a day and a month that can be told apart",
-        f"Set `time_format` of this table to '{by_day}' or to '{by_month}', or write times in "
-        "ISO 8601 (2023-08-10 10:10:00).",
+        f"Set `time_format` of this table to {ways}, or write times in ISO 8601 "
+        "(2023-08-10 10:10:00).",
     )
 
 

@@ -14,7 +14,8 @@ from dapple.errors import InputError
 # An offset or an abbreviation behind a time: Z, +02:00, +0200, UTC+1, MEZ. A number needs a time of
 # day before it: the year of 10-08-2023 is no offset.
 OFFSET = (
-    r"(?:(?:(?<=:\d\d)|(?<=[.,]\d{3})|(?<=[.,]\d{6}))\s*(?P<offset>[+\-−]\d{2}:?\d{2})|"
+    r"(?:(?:(?<=:\d\d)|(?<=[.,]\d{3})|(?<=[.,]\d{6}))\s*"
+    r"(?P<offset>[+\-−]\d{2}:?\d{2}|(?<=\d:\d\d:\d\d)[+\-−]\d{2})|"
     r"(?<=\d)\s*(?P<name>(?:UTC|GMT)[+\-−]\d{1,2}(?::\d\d)?|(?!AM|PM|am|pm|Uhr)[A-Za-z]{2,5}|Z))$"
 )
 

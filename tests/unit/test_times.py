@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from dapple import timezones
+from dapple import time_formats, timezones
 from dapple.errors import InputError
 from dapple.times import hourly, parse, spread, time_range, utc
 
@@ -109,6 +109,11 @@ def test_the_hour_that_autumn_repeats_is_told_apart_in_every_sensors_own_series(
         ("13-08-2023 10:10", "2023-08-13 10:10"),
         ("10-Aug-2023 10:10", "2023-08-10 10:10"),
         ("2023/08/10 10:10", "2023-08-10 10:10"),
+        ("2023/8/10 9:10:00 AM", "2023-08-10 09:10"),
+        ("2023-08-10 12:10:00+02", "2023-08-10 10:10"),
+        ("2023-8-1 9:10", "2023-08-01 09:10"),
+        ("2023.08.10 10:10:00", "2023-08-10 10:10"),
+        ("2023-08-10_10:10:00", "2023-08-10 10:10"),
     ],
 )
 def test_times_are_read_as_loggers_and_services_write_them(text, time):
@@ -123,6 +128,13 @@ def test_day_and_month_are_told_apart_by_the_step_or_refused():
     assert parsed("10/8/2023 10:10", zone="UTC", time_format="%d/%m/%Y %H:%M") == [
         "2023-08-10 10:10"
     ]
+
+
+def test_a_year_of_two_digits_in_front_is_told_by_the_step_or_refused():
+    two_days = [f"23-08-{day:02d} {hour:02d}:00" for day in (9, 10) for hour in range(24)]
+    assert parsed(*two_days, zone="UTC")[-1] == "2023-08-10 23:00"
+    with pytest.raises(InputError, match="23 August 2010 or 10 August 2023"):
+        parsed("23-08-10 10:10", zone="UTC")
 
 
 def test_numbers_are_times_only_where_that_is_declared():
@@ -164,3 +176,30 @@ def test_a_run_of_less_than_some_hours_is_spread_and_one_of_one_time_is_kept():
     short = time_range("2023-08-10 10:10", "2023-08-10 11:50", 10, "UTC")
     assert len(hourly(short, "UTC")) == 4
     assert hourly(short[:1], "UTC").tolist() == [0]
+
+
+WAYS = ("%Y-%m-%d %H:%M", "%Y-%m-%d %H:%M:%S", "%Y-%m-%dT%H:%M:%S", "%Y-%m-%dT%H:%M:%SZ",
+        "%Y-%m-%d %H:%M:%S+00:00", "%d/%m/%Y %H:%M:%S", "%m/%d/%Y %I:%M:%S %p",
+        *time_formats.CLEAR)  # fmt: skip
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_every_minute_of_a_day_is_read_as_it_was_written(way):
+    index = pd.date_range("2023-08-23", periods=1440, freq="min", unit="ns")
+    text = pd.Series(index.strftime(way), name="time_utc")
+    wanted = pd.DatetimeIndex(pd.to_datetime(text, format=way, utc=True)).as_unit("ns")
+    assert (times_of(text) == wanted).all()
+
+
+def times_of(text):
+    return parse(text, "a.csv", "UTC")
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["2023-08-10 24:00", "2023-08-10T24:00:00", "202308102400", "20230810240000", "20230810 2400",
+     "10.08.2023 24:00", "20230810:2400", "2023-08-10 24:00:00Z"],
+)  # fmt: skip
+def test_24_hours_are_the_next_midnight(text):
+    (time,) = times_of(pd.Series([text], name="time"))
+    assert time == pd.Timestamp("2023-08-11", tz="UTC")
