@@ -87,6 +87,12 @@ def find_timezone(name: str, where: str = "timezone") -> ZoneInfo | timezone:
     )
 
 
+def offset_of_hours(hours: float) -> str:
+    """The name of an offset from hours east of Greenwich: 5.5 is +05:30."""
+    whole, minutes = divmod(round(60 * abs(hours)), 60)
+    return f"{'-' if hours < 0 else '+'}{whole:02d}:{minutes:02d}"
+
+
 def is_same(one: str, other: str) -> bool:
     """Whether two names of zones mean one offset in January and in July."""
     zones = (find_timezone(one), find_timezone(other))

@@ -86,6 +86,27 @@ TABLES = {
     "rows with the start and the end of an interval": "Beginn;Ende;Globalstrahlung [W/m²]\n"
     "10.08.2023 12:00;10.08.2023 12:10;500,0\n10.08.2023 12:10;10.08.2023 12:20;1.001,5\n",
 }
+TABLES["EnergyPlus weather, EPW"] = (
+    "LOCATION,Freiburg,-,DEU,TMY3,108030,48.00,7.85,1.0,308.0\n"
+    "DESIGN CONDITIONS,0\nTYPICAL/EXTREME PERIODS,0\nGROUND TEMPERATURES,0\n"
+    "HOLIDAYS/DAYLIGHT SAVINGS,No,0,0,0\nCOMMENTS 1,a\nCOMMENTS 2,b\n"
+    "DATA PERIODS,1,1,Data,Sunday, 1/ 1,12/31\n"
+    "2023,8,10,11,0,?9,20,10,50,98000,900,1340,300,500,700,100" + ",0" * 19 + "\n"
+    "2023,8,10,12,60,?9,20,10,50,98000,900,1340,300,9999,700,100" + ",0" * 19 + "\n"
+)
+TABLES["TMY3 of NREL"] = (
+    '723815,"DAGGETT",CA,-8.0,34.867,-116.783,586\n'
+    "Date (MM/DD/YYYY),Time (HH:MM),ETR (W/m^2),GHI (W/m^2),GHI source,DNI (W/m^2),DHI (W/m^2)\n"
+    "08/10/2023,02:00,900,500,1,700,100\n08/10/2023,24:00,900,0,1,0,0\n"
+)
+WORKBOOK = "workbook of a spreadsheet, XLSX"
+SHEET = pd.DataFrame(
+    {
+        "Datum": pd.to_datetime(["2023-08-10 12:00:00", "2023-08-10 12:10:00"]),
+        "Globalstrahlung [W/m²]": [500.0, 1001.5],
+        "Diffus [W/m²]": [100, 101],
+    }
+)
 RECORDS = {
     "HOBO export": ("logger_3_7.csv", '"Plot Title: a"\n"#","Date Time, GMT+02:00","PAR, uE"\n'
                     "1,08/10/23 12:00:00 PM,500\n2,08/10/23 12:01:00 PM,501\n"),
@@ -107,7 +128,7 @@ def written(have):
 
 
 def test_every_row_is_tested_and_there_are_twelve_at_least():
-    assert set(ROWS) == {*TABLES, *RECORDS, *IMAGES}
+    assert set(ROWS) == {*TABLES, *RECORDS, *IMAGES, WORKBOOK}
     assert len(ROWS) >= 12
 
 
@@ -121,6 +142,15 @@ def test_radiation_is_read_in_its_unit_and_zone(have, tmp_path):
     found = radiation_table.read(tmp_path / "a.csv", site=FREIBURG, **columns, **declared)
     assert found.table.index[0] == HOUR
     assert found.table["global_w_m2"].iloc[0] == pytest.approx(500.0, abs=0.5)
+
+
+def test_a_workbook_is_read_as_the_table_it_holds(tmp_path):
+    SHEET.to_excel(tmp_path / "a.xlsx", index=False)
+    section = written(WORKBOOK).radiation
+    declared = section.model_dump(include=set(radiation_table.Declared.__dataclass_fields__))
+    found = radiation_table.read(tmp_path / "a.xlsx", site=FREIBURG, **declared).table
+    assert found.index[0] == HOUR
+    assert found.to_numpy().tolist() == [[500.0, 100.0], [1001.5, 101.0]]
 
 
 @pytest.mark.parametrize("have", RECORDS)

@@ -2,7 +2,8 @@
 
 Campbell TOA5 and TOACI1, Onset HOBO, DWD's ten-minute and hourly radiation, BSRN (PANGAEA's text
 and the station-to-archive file), NSRDB, PVGIS (hourly, typical year), FLUXNET, CAMS, Solcast,
-Open-Meteo; and those of `station_layouts`, `logger_layouts` and `reanalysis_layouts`.
+Open-Meteo; and those of `station_layouts`, `building_layouts`, `logger_layouts` and
+`reanalysis_layouts`.
 """
 
 import re
@@ -16,10 +17,12 @@ import pandas as pd
 
 from dapple.errors import InputError
 from dapple.formats import table_numbers
+from dapple.formats.building_layouts import epw, tmy3
 from dapple.formats.logger_layouts import davis, meter
 from dapple.formats.reanalysis_layouts import era5, power
 from dapple.formats.station_layouts import knmi, midc, surfrad
 from dapple.formats.text_table import JOINED_TIME, Table, build, there
+from dapple.timezones import offset_of_hours
 
 
 def recognise(path: Path, lines: Sequence[str]) -> Table | None:
@@ -156,16 +159,10 @@ def _nsrdb(path: Path, lines: Sequence[str]) -> Table | None:
         table,
         cells=table.cells.assign(**{JOINED_TIME: time}),
         units={"GHI": "W/m2", "DHI": "W/m2"},
-        timezone=_offset(hours),
+        timezone=offset_of_hours(hours),
         interval_min=0.0,
         known=there(table, **{"global": "GHI", "diffuse": "DHI"}) | {"time": JOINED_TIME},
     )
-
-
-def _offset(hours: float) -> str:
-    """5.5 as +05:30."""
-    whole, minutes = divmod(round(60 * abs(hours)), 60)
-    return f"{'-' if hours < 0 else '+'}{whole:02d}:{minutes:02d}"
 
 
 def _pvgis(path: Path, lines: Sequence[str]) -> Table | None:
@@ -321,7 +318,7 @@ def of_open_meteo(table: Table, seconds: float) -> Table:
     is_known = abs(seconds) <= 14 * 3600
     return replace(
         table,
-        timezone=_offset(seconds / 3600) if is_known else None,
+        timezone=offset_of_hours(seconds / 3600) if is_known else None,
         interval_label="end",
         known=known | {"time": "time"},
     )
@@ -346,4 +343,6 @@ LAYOUTS: tuple[Callable[[Path, Sequence[str]], Table | None], ...] = (
     davis,
     power,
     era5,
+    epw,
+    tmy3,
 )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dapple.errors import InputError
-from dapple.formats import column_names, json_layouts, table_layouts, table_numbers
+from dapple.formats import column_names, json_layouts, spreadsheets, table_layouts, table_numbers
 from dapple.formats.text_table import Table, build, cells_of, trimmed, uneven
 from dapple.formats.units import is_unit
 
@@ -20,6 +20,7 @@ LIGHT_FLAGS = (
 )  # fmt: skip
 """Numbers by which loggers and services mark missing light: none is a light."""
 
+CAMPBELL_BINARY = re.compile(rb'"TOB[123]"')
 QUOTED = re.compile(r'"[^"]*"')
 HEAD_LINES, MOST_BREAKS = 40, 4
 """Lines at the beginning, and breaks in one quoted cell of them."""
@@ -63,7 +64,7 @@ class Declared:
 
 
 def read(path: str | Path, *, decimal: str = "") -> Table:
-    """Read a delimited text table of any common layout.
+    """Read a delimited text table of any common layout, or a workbook with one table.
 
     Encodings (UTF-8 with or without mark, UTF-16, else Windows-1252), delimiters, lines before the
     header, quoted cells and a row of units are recognised, and the layouts in
@@ -82,7 +83,11 @@ def read(path: str | Path, *, decimal: str = "") -> Table:
         for two columns.
     """
     path = Path(path)
-    lines = read_lines(path)
+    if spreadsheets.is_spreadsheet(path):
+        rows, sign = spreadsheets.lines(path, decimal)
+        lines, decimal = _whole_cells(rows), decimal or sign
+    else:
+        lines = read_lines(path)
     table = json_layouts.recognise(path, lines) or table_layouts.recognise(path, lines)
     table = table or _with_spans(_plain(path, lines))
     return replace(table, decimal=decimal or table.decimal)
@@ -93,8 +98,11 @@ def read_lines(path: Path) -> list[str]:
     if not path.is_file():
         raise InputError(path, "no file", "a table", "Check the path in the configuration.")
     data = path.read_bytes()
-    if data[:2] == b"PK" or data[:4] == b"\xd0\xcf\x11\xe0":
-        raise InputError(path, "a spreadsheet", "a text table", "Save it as CSV.")
+    if CAMPBELL_BINARY.match(data):
+        raise InputError(
+            path, f"Campbell's binary format {data[1:5].decode()}", "a text table",
+            "Convert it to TOA5 with Card Convert, LoggerNet or PC400.",
+        )  # fmt: skip
     text = _decoded(data)
     if "\x00" in text:
         raise InputError(path, "a binary file", "a text table", "Export it as CSV.")
@@ -212,7 +220,18 @@ def _layout(path: Path, lines: Sequence[str]) -> tuple[str, int]:
                 "Export the table as CSV.",
             )
         return ",", filled[0]
-    return best[2], best[3]
+    return best[2], _wider(lines, filled, best[2], best[3])
+
+
+def _wider(lines: Sequence[str], filled: Sequence[int], delimiter: str, header: int) -> int:
+    """The line of names before a line of values whose last cells are empty, or the line itself."""
+    place = filled.index(header)
+    values = cells_of(lines[header], delimiter)
+    if place == 0 or delimiter == " " or not any(map(_is_value, values)):
+        return header
+    names = trimmed(cells_of(lines[filled[place - 1]], delimiter))
+    is_header = len(trimmed(values)) < len(names) <= len(values) and not any(map(_is_value, names))
+    return filled[place - 1] if is_header else header
 
 
 def is_unit_row(row: Sequence[str]) -> bool:
