@@ -35,7 +35,8 @@ def main(snakemake):
     images, found = rasters.read(inputs.canopy), rasters.read(inputs.map)
     rings, truth = [], []
     if inputs.crowns:
-        rings, truth = outlines(vectors.read(inputs.crowns), np.array([found.left_m, found.top_m]))
+        corner = np.array([found.left_m, images.bottom_m])
+        rings, truth = outlines(vectors.read(inputs.crowns), corner)
     figure = chlorophyll_maps.chlorophyll_map(
         found.values[:5],
         cell_m=found.pixel_m,
@@ -47,12 +48,12 @@ def main(snakemake):
 
 
 def outlines(crowns, corner):
-    """Outer rings from the north-west corner east and south [m], and the chlorophyll of each."""
+    """Outer rings from the south-west corner east and north [m], and the chlorophyll of each."""
     rings, truth = [], []
     for geometry, true in zip(crowns.geometries, crowns.lcc_ug_cm2, strict=True):
         parts = geometry["coordinates"]
         for part in [parts] if geometry["type"] == "Polygon" else parts:
-            rings.append((np.asarray(part[0], float)[:, :2] - corner) * (1, -1))
+            rings.append(np.asarray(part[0], float)[:, :2] - corner)
             truth.append(true)
     return rings, truth
 

@@ -48,6 +48,22 @@ def test_spectra_have_a_line_for_each_kind_of_pixel_and_model():
     assert len(right.get_legend().texts) == 3
 
 
+def test_spectra_show_what_taught_where_all_pixels_did():
+    pixels = pd.DataFrame(
+        [
+            (kind, nm, level, 0.1)
+            for kind, level in (("sunlit", 0.3), ("all", 0.2))
+            for nm in (4, 8)
+        ],
+        columns=["kind", "wavelength_nm", "mean", "deviation"],
+    )
+    entries = table(1, wavelength_nm=(4, 8), low=(0, 0.1), middle=(0.1, 0.2), high=(0.3, 0.4))
+    _, right = chlorophyll_maps.spectra(pixels, entries[entries["mask"] == "all"]).axes
+    assert "all pixels" in right.get_title("left")
+    assert len(right.get_legend().texts) == 3
+    assert right.lines[-1].get_ydata().tolist() == [0.2, 0.2]
+
+
 def test_losses_are_drawn_for_every_seed():
     own = pd.concat([
         table(1, train_loss=(0.1, 0.2), validation_loss=(0.1, 0.2)).assign(seed=seed, epoch=epoch)
@@ -66,7 +82,7 @@ def test_the_map_lies_where_its_cells_are_and_marks_strange_ones():
     )
     left, right = figure.axes[:2]
     assert left.get_xlim() == (0, 8)
-    assert left.get_ylim() == (5, 0)
-    assert left.images[0].get_extent() == [0, 9, 6, 0]
+    assert left.get_ylim() == (0, 5)  # north is up
+    assert left.images[0].get_extent() == [0, 9, -1, 5]
     assert left.patches[0].get_xy()[0] == pytest.approx([1.0, 1.0])
-    assert right.lines[0].get_xydata().tolist() == [[7.5, 1.5]]
+    assert right.lines[0].get_xydata().tolist() == [[7.5, 3.5]]

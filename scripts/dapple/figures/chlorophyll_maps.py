@@ -164,18 +164,20 @@ def spectra(pixels: pd.DataFrame, simulated: pd.DataFrame) -> Figure:
                       capsize=2, lw=1, color=KIND_COLOURS[kind], label=kind)  # fmt: skip
     left.set(title="observed canopy pixels", xlabel="wavelength [nm]", ylabel="reflectance")
     left.legend()
-    sunlit = pixels[pixels["kind"] == "sunlit"]
+    taught = list(dict.fromkeys(simulated["mask"]))
+    mask = "sunlit" if "sunlit" in taught or not taught else taught[0]
+    observed = pixels[pixels["kind"] == mask]
     shift = -6.0
-    for model, rows in simulated[simulated["mask"] == "sunlit"].groupby("model", sort=False):
+    for model, rows in simulated[simulated["mask"] == mask].groupby("model", sort=False):
         right.errorbar(
             rows["wavelength_nm"] + shift, rows["middle"],
             [rows["middle"] - rows["low"], rows["high"] - rows["middle"]], fmt="o", ms=3,
             capsize=2, lw=1, color=COLOURS[model], label=f"{LABELS[model]}, 5 to 95 %",
         )  # fmt: skip
         shift += 6.0
-    right.plot(sunlit["wavelength_nm"], sunlit["mean"], color=KIND_COLOURS["sunlit"], lw=1.5,
+    right.plot(observed["wavelength_nm"], observed["mean"], color=KIND_COLOURS[mask], lw=1.5,
                label="observed mean")  # fmt: skip
-    right.set(title="training entries of sunlit pixels", xlabel="wavelength [nm]", ylim=(0, None))
+    right.set(title=f"training entries of {LABELS[mask]}", xlabel="wavelength [nm]", ylim=(0, None))
     right.legend()
     return figure
 
@@ -229,14 +231,14 @@ def chlorophyll_map(
     size_m : two floats
         Extent east and north of the images [m], where the last cells may be cut.
     rings : sequence of (k, 2) arrays
-        Outlines of crowns, from the north-west corner east and south [m].
+        Outlines of crowns, from the south-west corner of the images east and north [m].
     truth : sequence of float
         Their chlorophyll, which fills them in the first panel's colours; NaN: only an outline.
     """
     figure = style.new_figure(8.6, 0.9 + 3.3 * size_m[1] / size_m[0])
     left, right = figure.subplots(1, 2)
     _, rows, columns = values.shape
-    reach = [0, columns * cell_m, rows * cell_m, 0]
+    reach = [0, columns * cell_m, size_m[1] - rows * cell_m, size_m[1]]
     lcc, low, high, _, outside = values
     shown = left.imshow(lcc, extent=reach, vmin=10, vmax=70, cmap=CHLOROPHYLL_MAP)
     figure.colorbar(shown, ax=left, label=f"leaf chlorophyll [{UNIT}]", shrink=0.85)
@@ -246,7 +248,8 @@ def chlorophyll_map(
     width = right.imshow(high - low, extent=reach, vmin=0, cmap="cividis")
     figure.colorbar(width, ax=right, label=f"width of the interval [{UNIT}]", shrink=0.85)
     row, column = np.nonzero(np.nan_to_num(outside) > 0)
-    right.plot((column + 0.5) * cell_m, (row + 0.5) * cell_m, "x", ms=4, color="#D55E00",
+    north = size_m[1] - (row + 0.5) * cell_m
+    right.plot((column + 0.5) * cell_m, north, "x", ms=4, color="#D55E00",
                label="beyond the training range")  # fmt: skip
     if len(row):
         right.legend(loc="lower left", frameon=True, fontsize=7)
@@ -255,6 +258,6 @@ def chlorophyll_map(
     right.set_title("how far to trust it")
     for axes in (left, right):
         axes.grid(False)
-        axes.set(xlim=(0, size_m[0]), ylim=(size_m[1], 0), aspect="equal",
-                 xlabel="east [m]", ylabel="south [m]")  # fmt: skip
+        axes.set(xlim=(0, size_m[0]), ylim=(0, size_m[1]), aspect="equal",
+                 xlabel="east [m]", ylabel="north [m]")  # fmt: skip
     return figure

@@ -81,6 +81,7 @@ def build(
     figures : sequence of Path
         Pictures, called {plot}_{name}.png.
     """
+    is_known = "field" in set(accuracy["test_set"])
     return document(
         f"Leaf chlorophyll of {plot}",
         _trust(retrieved, usual_outside, accuracy),
@@ -89,7 +90,11 @@ def build(
             Section("What was noticed about the input", noticed(files)),
             Section(
                 "Figures",
-                [picture(path, CAPTIONS[path.stem.rpartition("_")[2]]) for path in figures],
+                [
+                    picture(path, CAPTIONS[name])
+                    for path in figures
+                    if (name := path.stem.rpartition("_")[2]) != "field" or is_known
+                ],
             ),
             Section("Scores", [*_scores(accuracy, trees)]),
             Section("What was read", [_facts(files, sun, sky, sky_told_by, crs)]),
@@ -128,10 +133,15 @@ def _trust(retrieved: pd.DataFrame, usual_outside: float, accuracy: pd.DataFrame
     shares = retrieved["outside_share"].dropna().astype(float)
     if shares.empty:
         return ["No cell has data: nothing was retrieved."]
+    least, most = f"{100 * shares.min():.0f}", f"{100 * shares.max():.0f}"
+    cells = (
+        f"{most} % of the cells look"
+        if least == most
+        else f"By model, {least} to {most} % of the cells look"
+    )
     found = [
-        f"By model, {100 * shares.min():.0f} to {100 * shares.max():.0f} % of the cells look "
-        f"unlike all that was simulated ({100 * usual_outside:.1f} % of what taught does): there, "
-        "values are extrapolated.",
+        f"{cells} unlike all that was simulated ({100 * usual_outside:.1f} % of what taught does): "
+        "there, values are extrapolated.",
         "Intervals hold for leaves and canopies as they were simulated.",
     ]
     if "field" not in set(accuracy["test_set"]):
