@@ -270,6 +270,17 @@ def test_another_clock_is_found_with_the_offset_to_declare(ahead_min, offset):
         stop(plausible.check(wrong, FREIBURG))
 
 
+@pytest.mark.parametrize("hours", [-10, -5, 3, 8, 11])
+def test_another_clock_is_found_under_the_midnight_sun(hours):
+    site, _ = STATIONS["Tromsø"]
+    truth = minutes(20, start="2023-06-10", site=site)
+    for step_min in (10, 60):
+        wrong = station(truth, step_min, "end", ahead_min=60 * hours, only_global=True)
+        offset = f"`radiation.timezone: '{hours:+03d}:00'`"
+        with pytest.raises(InputError, match=re.escape(offset)):
+            stop(plausible.check(wrong, site))
+
+
 def test_a_declared_label_that_the_sun_contradicts_a_little_is_only_a_warning():
     wrong = station(THIRTY, 15, "end", assumed="middle")
     (doubt,) = plausible.check(wrong, FREIBURG)

@@ -28,6 +28,22 @@ def minutes(days, *, start="2023-08-01", site=FREIBURG, clouds=True, seed=1):
     )
 
 
+def dark(days, clear_days, *, start, site=FREIBURG, seed=1):
+    """Overcast days of any thickness, that changes by the hour, and some clear ones [W m⁻²]."""
+    truth = minutes(days, start=start, site=site, clouds=False)
+    rng = np.random.default_rng(seed)
+    hours = np.zeros(24 * days)
+    for hour in range(1, len(hours)):
+        hours[hour] = 0.7 * hours[hour - 1] + 0.7 * rng.normal()
+    thickness = np.repeat(rng.normal(scale=0.4, size=days), 1440)
+    thickness += 0.25 * np.interp(np.arange(len(truth)) / 60.0, np.arange(len(hours)), hours)
+    through = 1.0 / (1.0 + 3.0 * np.exp(thickness))
+    through[np.isin(np.arange(len(truth)) // 1440, rng.choice(days, clear_days, False))] = 1.0
+    total = through * truth["global_w_m2"]
+    scattered = total.where(through < 1.0, truth["diffuse_w_m2"])
+    return pd.DataFrame({"global_w_m2": total, "diffuse_w_m2": scattered})
+
+
 def station(
     truth,
     step_min,

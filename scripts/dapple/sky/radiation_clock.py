@@ -28,6 +28,7 @@ OFFSET_OF_RESIDUAL_MIN = 250.0
 """Offset that what is left of a day may feign: a day of 1 % cloud moves by 2 to 3 min."""
 SURE = 25.0
 """How much more badly no offset has to fit, times the residual's variance of one row."""
+CUT_ANEW_MIN = 120.0
 LIGHT_W_M2 = 20.0
 FIRST_LIGHT_W_M2 = 5.0
 READ_AS = {
@@ -71,13 +72,15 @@ def offset(
         return None
     total = radiation.table["global_w_m2"].to_numpy(float)
     start, end = radiation.intervals()
-    day = np.floor(0.5 * (start + end) / 86400e9 + site.longitude_deg / 360.0).astype(int)
+    late_ns = 60e9 * _late_min(0.5 * (start + end), total, site)
+    day = np.floor((0.5 * (start + end) - late_ns) / 86400e9 + site.longitude_deg / 360.0)
+    day = day.astype(int)
     best, weights, left = [], [], []
     for one in _brightest(day, total):
         rows = np.flatnonzero(day == one)
         noon_ns = (one + 0.5 - site.longitude_deg / 360.0) * 86400e9
         curves = _Curves(noon_ns, site, linke_turbidity)
-        if not curves.is_covered(start[rows], end[rows], step):
+        if not curves.is_covered(start[rows] - late_ns, end[rows] - late_ns, step):
             continue
         around = 0.0
         for reach, by in ((REACH_MIN, COARSE_MIN), (COARSE_MIN, FINE_MIN)):
@@ -100,6 +103,17 @@ def offset(
         return None
     error_min = OFFSET_OF_RESIDUAL_MIN * float(np.median(left))
     return ClockOffset(minutes if np.sum(weights) > SURE else 0.0, len(best), error_min)
+
+
+def _late_min(at_ns: np.ndarray, total: np.ndarray, site: Site) -> float:
+    """How much later than noon light is centred through all days [min]; 0 where it is near.
+
+    Where the sun does not set, a day is cut where the table itself is darkest: cut by a wrong
+    clock it is made of two days.
+    """
+    turn = 2.0 * np.pi * (at_ns / 86400e9 + site.longitude_deg / 360.0 - 0.5)
+    late = float(np.angle(np.sum(np.maximum(total, 0.0) * np.exp(1j * turn)))) / (2.0 * np.pi)
+    return 1440.0 * late if abs(1440.0 * late) > CUT_ANEW_MIN else 0.0
 
 
 def _brightest(day: np.ndarray, total: np.ndarray) -> np.ndarray:

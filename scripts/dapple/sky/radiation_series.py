@@ -13,9 +13,16 @@ from scipy.interpolate import PchipInterpolator
 from dapple import findings
 from dapple.errors import InputError
 from dapple.findings import Finding
-from dapple.sky import plausible
+from dapple.sky import plausible, typical_years
 from dapple.sky.radiation_table import Radiation, read
-from dapple.sky.sun import Site, clear_sky, day_of_year, position
+from dapple.sky.sun import (
+    Site,
+    clear_sky,
+    day_of_year,
+    direct_diffuse,
+    mean_clear_sky,
+    position,
+)
 from dapple.times import utc
 
 Decomposition = Literal["erbs", "dirint"]
@@ -26,8 +33,6 @@ MOST_OF_CLEAR_SKY = np.array([[1.15], [4.0]])
 """Direct and diffuse radiation over the clear-sky model's that a gap is filled with at most."""
 WEATHER_LASTS_MIN = 60.0
 """Into a gap the last row counts less and less, and the median of this span before it more."""
-CLEAR_SAMPLES_MIN = 1.0
-"""Step at which the clear sky is averaged over an interval."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +91,10 @@ def broadband(
     if kind == "clear_sky":
         clear = clear_sky(times, site, linke_turbidity=linke_turbidity)
         return Series(clear, facts={"kind": kind})
-    measured = near(read(path, site=site, **table), times)  # type: ignore[arg-type]
+    measured = read(path, site=site, **table)  # type: ignore[arg-type]
+    if typical_years.is_typical(measured.table.index):
+        measured = typical_years.in_year_of(measured, times)
+    measured = near(measured, times)
     noticed = list(measured.findings)
     doubts = plausible.check(measured, site, linke_turbidity=linke_turbidity)
     if implausible == "refuse":
@@ -166,14 +174,14 @@ def at(
     """
     times = utc(times)
     measured, noticed = _parts_of(radiation, site, diffuse_model)
-    model = _direct_diffuse(clear_sky(times, site, linke_turbidity=linke_turbidity))
+    model = direct_diffuse(clear_sky(times, site, linke_turbidity=linke_turbidity))
     sun_zenith = position(times, *site.place)["sun_zenith_deg"].to_numpy()
     if radiation.interval_min:
         clear = mean_clear_sky(radiation.intervals(), site, linke_turbidity=linke_turbidity)
         parts, is_covered = _within_intervals(radiation, times.asi8, measured, clear, model)
     else:
         at_table = clear_sky(radiation.table.index, site, linke_turbidity=linke_turbidity)
-        clear = _direct_diffuse(at_table)
+        clear = direct_diffuse(at_table)
         parts, is_covered = _between_samples(radiation, times.asi8, measured, max_gap_min)
     middles = radiation.middles()
     is_high = position(middles, *site.place)["sun_zenith_deg"].to_numpy() < 90.0 - LOWEST_SUN_DEG
@@ -204,20 +212,6 @@ def at(
             findings.warning(radiation.where, text, "radiation of the whole run", remedy)
         )
     return Series(values, tuple(noticed), {"modelled_share_of_day": share})
-
-
-def mean_clear_sky(
-    intervals_ns: np.ndarray, site: Site, *, linke_turbidity: float | None = 3.0
-) -> np.ndarray:
-    """Direct and diffuse radiation (2, n) of a clear sky, means over intervals (2, n) [W m⁻²]."""
-    start, end = intervals_ns
-    length_min = (end[0] - start[0]) / 60e9 if len(start) else 0.0
-    samples = max(1, round(length_min / CLEAR_SAMPLES_MIN))
-    share = (np.arange(samples) + 0.5) / samples
-    moments = (start[:, None] + share * (end - start)[:, None]).astype(np.int64)
-    index = pd.DatetimeIndex(pd.to_datetime(moments.ravel(), utc=True))
-    parts = _direct_diffuse(clear_sky(index, site, linke_turbidity=linke_turbidity))
-    return parts.reshape(2, len(start), samples).mean(axis=2)
 
 
 def split(radiation: Radiation, site: Site, model: Decomposition = "erbs") -> np.ndarray:
@@ -351,9 +345,3 @@ def _weather(
             weights.append(1.0 / max(away_ns, 1))
         ratio[:, missing[k]] = np.average(sides, axis=0, weights=weights)
     return ratio
-
-
-def _direct_diffuse(radiation: pd.DataFrame) -> np.ndarray:
-    """(2, t): direct and diffuse irradiance on the horizontal [W m⁻²]."""
-    diffuse = radiation["diffuse_w_m2"].to_numpy(float)
-    return np.stack([radiation["global_w_m2"].to_numpy(float) - diffuse, diffuse])

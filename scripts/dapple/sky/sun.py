@@ -131,6 +131,33 @@ def clear_sky(
     )
 
 
+def mean_clear_sky(
+    intervals_ns: np.ndarray,
+    site: Site,
+    *,
+    linke_turbidity: float | None = 3.0,
+    sample_min: float = 1.0,
+) -> np.ndarray:
+    """Direct and diffuse radiation (2, n) of a clear sky, means over intervals (2, n) [W m⁻²].
+
+    The mean of samples in steps of `sample_min`; one at the middle of an interval of no length.
+    """
+    start, end = intervals_ns
+    length_min = (end[0] - start[0]) / 60e9 if len(start) else 0.0
+    samples = max(1, round(length_min / sample_min))
+    share = (np.arange(samples) + 0.5) / samples
+    moments = (start[:, None] + share * (end - start)[:, None]).astype(np.int64)
+    index = pd.DatetimeIndex(pd.to_datetime(moments.ravel(), utc=True))
+    parts = direct_diffuse(clear_sky(index, site, linke_turbidity=linke_turbidity))
+    return parts.reshape(2, len(start), samples).mean(axis=2)
+
+
+def direct_diffuse(radiation: pd.DataFrame) -> np.ndarray:
+    """Direct and diffuse irradiance (2, t) of a table with global and diffuse [W m⁻²]."""
+    diffuse = radiation["diffuse_w_m2"].to_numpy(float)
+    return np.stack([radiation["global_w_m2"].to_numpy(float) - diffuse, diffuse])
+
+
 def direct_normal(
     radiation: pd.DataFrame, sun_zenith_deg: np.ndarray, extraterrestrial_w_m2: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
