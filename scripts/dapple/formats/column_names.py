@@ -41,6 +41,7 @@ MONTH = ("month", "mon", "mo", "mm", "monat", "mois", "mes")
 DAY_OF_MONTH = ("day", "dy", "dd", "tag", "jour", "dia")
 DAY_OF_YEAR = ("doy", "jday", "julian_day", "day_of_year", "yday", "ddd")
 HOUR = ("hour", "hr", "hh", "stunde", "heure", "hora", "hh24")
+SECOND = ("second", "seconds", "sec", "ss", "sekunde", "sekunden", "seconde", "segundo")
 MINUTE = ("minute", "minutes", "min", "mi", "mn", "mi format in local standard time")
 
 GLOBAL = ("global_W_m2", "global", "ghi", "globalstrahlung", "global_radiation",

@@ -168,9 +168,13 @@ def _of_parts(table: Table) -> Times | None:
 
 
 def _clock(table: Table, hour: str, minute: str | None) -> pd.Series:
-    """The time of the day from a column of hours, which may have a fraction, and one of minutes."""
+    """The time of the day from hours, which may have a fraction, or hours, minutes and seconds."""
     if minute:
-        return _whole(table, hour, 2) + ":" + _whole(table, minute, 2)
+        text = _whole(table, hour, 2) + ":" + _whole(table, minute, 2)
+        second = table.find(column_names.SECOND)
+        if second is None or not _all_like(table, second, r"[0-5]?\d(?:[.,]0*)?"):
+            return text
+        return text + ":" + _whole(table, second, 2)
     hours = table.text(hour).str.replace(",", ".").map(table_numbers.plain).astype(float)
     if (hours.dropna() % 1 == 0).all():
         return _whole(table, hour, 2) + ":00"
