@@ -51,7 +51,7 @@ def test_titles_comments_blank_lines_and_a_row_of_units_are_no_data(tmp_path):
     ("text", "message"),
     [
         ("", "an empty file"),
-        ("PK\x03\x04", "a spreadsheet"),
+        ("PK\x03\x04", "a broken workbook"),
         ("1,2\n3,4\n", "no header"),
         ("a,b\n1,2\n3\n4,5\n", "line 3: found 1 cells"),
         ("a,b\n1,2,3\n1,2,3\n", "found 3 cells"),
