@@ -8,8 +8,6 @@ import zipfile
 from datetime import date, datetime, time, timedelta
 from pathlib import Path
 
-import openpyxl
-
 from dapple.errors import InputError
 
 OLD = b"\xd0\xcf\x11\xe0"
@@ -76,6 +74,8 @@ def lines(path: Path, decimal: str = "") -> tuple[list[str], str]:
 
 def _sheets(path: Path) -> dict[str, list[list[tuple[object, str]]]]:
     """Value and number format of the cells, by sheet that is shown."""
+    import openpyxl  # takes a quarter of a second, and few tables are workbooks
+
     try:
         with zipfile.ZipFile(path) as archive:
             names = set(archive.namelist())
