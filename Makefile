@@ -1,11 +1,15 @@
-# run: the main job; test: everything that must hold. Both install what is missing first.
+# run: the main job; test: everything that must hold; quick: what tells within minutes whether
+# something broke. All install what is missing first.
 CORES ?= 2
 BIN := .venv/bin
 
-.PHONY: run test test-all setup lint format docs site lock coverage peers reproduce hooks
+.PHONY: run quick test test-all setup lint format docs site lock coverage peers reproduce hooks
 
 run: setup
 	$(BIN)/snakemake --cores $(CORES)
+
+quick: setup
+	$(BIN)/python -m pytest -q -n $(CORES) --dist loadfile -m "not whole and not long"
 
 test: setup lint
 	@tools/browser

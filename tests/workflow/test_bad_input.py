@@ -261,6 +261,7 @@ def test_radiation_at_naive_times_is_refused_and_the_zone_has_to_exist(tmp_path,
 # What looks like bad input and is none
 
 
+@pytest.mark.whole
 def test_at_night_there_is_no_light_and_no_error(small_run, tmp_path):
     project = small_run.clone(tmp_path / "night")
     night = "time={start: 2023-08-10 22:30, end: 2023-08-10 23:30}"
@@ -274,6 +275,7 @@ def test_at_night_there_is_no_light_and_no_error(small_run, tmp_path):
     assert overall["r"].isna().all()  # nothing varies: unknown, not 0
 
 
+@pytest.mark.whole
 def test_ones_own_cloud_in_utm_gives_the_polygons_of_the_same_scan(small_run, tmp_path):
     """The scan as text in world coordinates that float32 cannot hold, and ten lines of YAML."""
     project = small_run.clone(tmp_path / "own")

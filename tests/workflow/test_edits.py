@@ -11,6 +11,7 @@ import yaml
 from tests.workflow import dry_runs
 from tests.workflow.project import SMALL, copy_of_project
 
+pytestmark = pytest.mark.whole
 OWN = "config/example.yaml"
 
 # What follows from what.

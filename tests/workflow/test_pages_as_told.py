@@ -94,6 +94,7 @@ def example(tmp_path_factory):
     return project
 
 
+@pytest.mark.whole
 def test_the_example_of_an_own_scan_runs_and_finds_the_light(example):
     overall = pd.read_csv(example.result("statistics/overall.csv")).iloc[0]
     # The tree has flecks and clouds: a sky without it reaches 0.73.
@@ -104,6 +105,7 @@ def test_the_example_of_an_own_scan_runs_and_finds_the_light(example):
     assert "report.html" in {path.name for path in example.result("").iterdir()}
 
 
+@pytest.mark.whole
 def test_a_sensor_more_in_the_table_is_traced_alone_and_changes_no_other(example):
     light = example.result("light/polygons.nc")
     before = xr.load_dataset(light)

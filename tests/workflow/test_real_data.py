@@ -13,6 +13,7 @@ from rasterio.transform import from_origin
 from scipy import ndimage
 from tests.workflow.project import ROOT, copy_of_project
 
+pytestmark = pytest.mark.whole
 DATA = (ROOT / "../shared/data").resolve()
 THREE_TIMES = (
     "time={start: 2023-08-10 11:00, end: 2023-08-10 15:00, step_min: 120}",

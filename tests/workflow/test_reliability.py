@@ -99,9 +99,8 @@ def test_a_full_disk_leaves_no_half_written_file_and_a_later_run_finishes(undist
         subprocess.run(["umount", results], check=True, timeout=60)
 
 
-@pytest.mark.parametrize("behaviour", ["exit 0", "exit 3", "kill -9 $$"])
 def test_a_broken_cloudcompare_is_named_leaves_no_target_and_a_later_run_finishes(
-    small_run, tmp_path, behaviour
+    small_run, tmp_path
 ):
     project = small_run.clone(tmp_path / "dapple")
     target = project.result("clean/cloud.laz")
@@ -109,14 +108,16 @@ def test_a_broken_cloudcompare_is_named_leaves_no_target_and_a_later_run_finishe
     target.unlink()
     broken = tmp_path / "bin/CloudCompare"
     broken.parent.mkdir()
-    broken.write_text(f"#!/bin/sh\n{behaviour}\n")
-    broken.chmod(0o755)
     wanted = str(target.relative_to(project.folder))
     path = f"{broken.parent}{os.pathsep}{ENVIRONMENT['PATH']}"
-    done = project.snakemake(wanted, environment={"PATH": path})
-    assert done.returncode == 1
-    assert re.search(r"dapple: \S*CloudCompare\b.*: found .*; expected ", done.stdout), done.stdout
-    assert not target.exists()
+    for behaviour in ("exit 0", "exit 3", "kill -9 $$"):
+        broken.write_text(f"#!/bin/sh\n{behaviour}\n")
+        broken.chmod(0o755)
+        done = project.snakemake(wanted, environment={"PATH": path})
+        assert done.returncode == 1, behaviour
+        said = re.search(r"dapple: \S*CloudCompare\b.*: found .*; expected ", done.stdout)
+        assert said, done.stdout
+        assert not target.exists(), behaviour
     project.run(wanted)
     assert target.read_bytes() == expected
 

@@ -15,6 +15,7 @@ from tests.workflow.project import Project, copy_of_project
 
 from dapple.formats import rasters, vectors
 
+pytestmark = pytest.mark.whole
 COLUMNS = {
     "accuracy.csv": "plot model mask test_set n r2 rmse rrmse",
     "speed.csv": "method combinations seconds peak_rss_mb rmse_vs_direct max_vs_direct",

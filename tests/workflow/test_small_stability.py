@@ -4,6 +4,7 @@ import pandas as pd
 import pytest
 from tests.workflow.project import copy_of_project
 
+pytestmark = pytest.mark.whole
 STRESSORS = ["leaf_area", "noise_points", "scan_positions", "sensor_position"]
 METHODS = {"polygons", "surfels", "voxels_0.2", "voxels_1.0", "virtual_leaves"}
 

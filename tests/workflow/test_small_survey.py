@@ -6,6 +6,7 @@ from tests.workflow.project import ROOT, copy_of_project
 
 from dapple.formats import netcdf
 
+pytestmark = pytest.mark.whole
 COLUMNS = {
     "shadowing.csv": "stand design n_beams rs seed",
     "regression.csv": "stand design coverage_class slope r2 n",

@@ -3,6 +3,7 @@
 import pandas as pd
 import pytest
 
+pytestmark = pytest.mark.whole
 AN_HOUR = (
     "time={start: 2023-08-10 10:30, end: 2023-08-10 11:30, step_min: 2}",
     "light={check: false}",
