@@ -242,7 +242,6 @@ def test_a_parameter_of_voxels_reruns_the_light_in_voxels_alone(small_run):
     assert set(re.findall(r"light series, (\S+),", output)) == {"voxels_0.2", "voxels_1.0"}
 
 
-@pytest.mark.whole
 def test_a_fault_of_the_per_timestep_engine_reaches_the_agreement(small_run, tmp_path):
     project = small_run.clone(tmp_path / "halved")
     engine = project.folder / "scripts/dapple/light/timestep.py"
@@ -259,7 +258,6 @@ def test_a_fault_of_the_per_timestep_engine_reaches_the_agreement(small_run, tmp
 # The same bytes
 
 
-@pytest.mark.whole
 def test_cores_locale_zone_umask_home_and_path_change_no_byte(small_run, tmp_path):
     project = copy_of_project(tmp_path / "a b/ü/dapple")
     (tmp_path / "at home").mkdir()
