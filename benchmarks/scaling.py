@@ -4,7 +4,8 @@
 
 Each point is a process of its own: a synthetic tree in memory, then everything from handing it to
 Mitsuba to the light of all sensors and times, with a fixed number of rays. Writes `scaling.csv`,
-where rows of axes that were not asked for stay, and `scaling.png`. Memory is what the engine takes on top of the geometry that it is given.
+where rows of axes that were not asked for stay, and `scaling.png`. Memory is what the engine takes
+on top of the geometry that it is given.
 """
 
 import argparse
