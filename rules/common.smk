@@ -104,6 +104,11 @@ OWN_FRAME = (
 )
 
 
+def vectors(*paths):
+    """The same figures of this experiment for print, beside those for the screen."""
+    return [results(path.replace(".png", ".pdf")) for path in paths]
+
+
 def logs(name):
     """The log of a rule."""
     return results(f"logs/{name}.log")

@@ -7,7 +7,7 @@ Makes   figures/tree.png          the tree from the side and from above, with th
         figures/boxplot.png       correlation of every sensor by reconstruction
         figures/scatter.png       simulated against measured PAR
         figures/ground_map.png    PAR on the ground at four times
-        figures/*.pdf             the same figures as vectors, for print
+        figures/*.pdf             the same figures as vectors, for print; so it is in other studies
         figures/advice.png        what refinements of the light change and cost
         tradeoff/chart.png        accuracy against speed
         report.html               one self-contained page
@@ -37,7 +37,7 @@ FIGURES = {
         "category": "Light",
         "caption": "Photosynthetically active radiation through the day: measured (black) and "
         "simulated with each reconstruction (lines; band: where 90 % of records are expected "
-        "under the first), at sensors from the darkest to the brightest.",
+        "under the first), at sensors from the darkest to the brightest of those that are ever shaded.",
         "inputs": {
             "light": [results(f"light/{name}.nc") for name in LIT],
             "records": results("statistics/records.csv") if COMPARED else [],
@@ -142,7 +142,7 @@ for figure, about in FIGURES.items():
                 caption="../docs/captions/figure.rst",
                 category=about["category"],
             ),
-            vector=results(about["path"].replace(".png", ".pdf")),
+            vector=vectors(about["path"]),
         log:
             logs(f"{figure}_figure"),
         benchmark:

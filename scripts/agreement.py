@@ -17,7 +17,9 @@ def main(snakemake):
         for name, (one, other) in zip(params.reconstructions, pairs, strict=True):
             facts = agreement.compare(netcdf.read(one), netcdf.read(other), sky)
             rows.append({"reconstruction": name, "engine": engine, "reference": reference} | facts)
-    tables.write(snakemake.output.agreement, agreement.table(rows))
+    table = agreement.table(rows)
+    print(table.to_string())
+    tables.write(snakemake.output.agreement, table)
 
 
 if __name__ == "__main__":

@@ -17,21 +17,21 @@ def main(snakemake):
     accuracy = accuracy[accuracy["seed"].astype(str) == "ensemble"]
     tests = pd.concat([tables.read(path) for path in inputs.tests])
     own = accuracy[accuracy["test_set"] == "entries"]
-    style.save(chlorophyll_maps.simulated(tests, own), output.simulated)
+    style.save_both(chlorophyll_maps.simulated(tests, own), output.simulated)
     trees = pd.concat([tables.read(path) for path in inputs.trees])
     own = accuracy[accuracy["test_set"] == "field"]
-    style.save(chlorophyll_maps.field(trees, own), output.field)
+    style.save_both(chlorophyll_maps.field(trees, own), output.field)
     entries = {
         path: quantiles(tables.read(path), camera(params.bands), taught)
         for path, taught in zip(inputs.training, params.taught, strict=True)
     }
     figure = chlorophyll_maps.spectra(tables.read(inputs.pixels), pd.concat(entries.values()))
-    style.save(figure, output.spectra)
+    style.save_both(figure, output.spectra)
     histories = [
         tables.read(path).assign(**taught)
         for path, taught in zip(inputs.histories, params.taught, strict=True)
     ]
-    style.save(chlorophyll_maps.losses(pd.concat(histories)), output.losses)
+    style.save_both(chlorophyll_maps.losses(pd.concat(histories)), output.losses)
     images, found = rasters.read(inputs.canopy), rasters.read(inputs.map)
     rings, truth = [], []
     if inputs.crowns:
@@ -44,7 +44,7 @@ def main(snakemake):
         rings=rings,
         truth=truth,
     )
-    style.save(figure, output.map)
+    style.save_both(figure, output.map)
 
 
 def outlines(crowns, corner):

@@ -9,6 +9,7 @@ def main(snakemake):
     path = snakemake.input.cloud
     settings = options(snakemake.params) | {"model": snakemake.input.model or None}
     cloud, facts = classify(clouds.read(path), where=path, **settings)
+    print(f"{len(cloud):,} points by {facts['method']}: {facts['leaf_share']:.1%} of them leaf")
     clouds.write(snakemake.output.cloud, cloud)
     json.write(snakemake.output.scores, facts)
 

@@ -5,6 +5,7 @@ import time
 import pandas as pd
 
 from dapple.formats import tables
+from dapple.progress import followed
 from dapple.retrieval import network, training_entries
 from dapple.retrieval.noise import Noise
 from dapple.workflow import run
@@ -20,7 +21,8 @@ def main(snakemake):
     target = training_entries.chlorophyll(frame)
     margin = 0.1 * (params.range_ug_cm2[1] - params.range_ug_cm2[0])
     histories = []
-    for seed, path in zip(params.seeds, snakemake.output.networks, strict=True):
+    wanted = list(zip(params.seeds, snakemake.output.networks, strict=True))
+    for seed, path in followed(wanted, "networks"):
         start = time.perf_counter()
         net, history = network.train(
             features[parts["train"]],

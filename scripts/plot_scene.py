@@ -35,7 +35,7 @@ def main(snakemake):
     picture = figure.crowns(
         rasters.read(inputs.chm), labels, cloud.world_xyz_m, centres_m + cloud.origin_m, SLICE_M
     )
-    style.save(picture, output.picture)
+    style.save_both(picture, output.picture)
     print(summary)
     if scene.facts["pulses"]["returns"] == "single":
         print(

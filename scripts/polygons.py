@@ -18,6 +18,8 @@ def main(snakemake):
     if correction:
         grid = as_estimated(voxel_grids.read(snakemake.input.voxels))
         leaves = occlusion.correct(leaves, grid, seed=settings["seed"], **correction)
+    for kind, mesh in (("leaf", leaves), ("wood", made["wood"])):
+        print(f"{mesh.n_elements:,} {kind} polygons, {mesh.area_m2:.2f} m²")
     meshes.write_ply(snakemake.output.leaves, leaves, origin_m)
     meshes.write_ply(snakemake.output.wood, made["wood"], origin_m)
     truth = json.read(snakemake.input.truth) if snakemake.input.truth else None

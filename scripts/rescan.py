@@ -9,6 +9,7 @@ import pandas as pd
 
 from dapple import steps
 from dapple.formats import clouds, meshes, shots, tables
+from dapple.progress import followed
 from dapple.structure.voxel_sizes import size_of
 from dapple.virtual.left_out import seen_from
 from dapple.workflow import evenly, options, run
@@ -36,7 +37,7 @@ def main(snakemake):
     if name == "truth":
         truth = {kind: meshes.read_ply(inputs[kind]) for kind in ("leaf", "wood")}, None
     tables_found = []
-    for k in evenly(len(positions), n_left_out):
+    for k in followed(evenly(len(positions), n_left_out), "scan positions left out"):
         left_out = [positions[k]]
         is_new = truth is None and len(positions) > 1
         made = truth or rebuilt(name, scan, left_out if is_new else [], **making)

@@ -21,6 +21,8 @@ def main(snakemake):
         table = sensors.grid_around(stem_m, **params.grid, ground=ground)
         table = sensors.turned(table, **params.facing)
     sensors.check(table, ground=ground, where=str(inputs.table or "sensors"))
+    low_m, high_m = table["z_m"].min(), table["z_m"].max()
+    print(f"{len(table)} sensors, {low_m:.2f} to {high_m:.2f} m high in the local frame")
     tables.write(snakemake.output.sensors, table, None)
 
 

@@ -24,6 +24,11 @@ def main(snakemake):
     measured = [measured_sky.read(path).at(times) for path in snakemake.input.sky_table]
     sky = sky_dataset(times, site, radiation.values, *measured, **params.atmosphere)
     sky = scaled(sky, registration["gain"])
+    height_deg = 90 - sky["sun_zenith_deg"].to_numpy()
+    print(
+        f"{len(times)} times, {times[0]} to {times[-1]}, "
+        f"sun {height_deg.min():.1f} to {height_deg.max():.1f}° high"
+    )
     netcdf.write(snakemake.output.sky, sky)
     facts = radiation.facts | {"findings": findings.rows(radiation.findings)}
     json.write(snakemake.output.radiation, facts)

@@ -4,6 +4,7 @@ import pandas as pd
 
 from dapple import engine
 from dapple.formats import clouds, json, meshes, shots, tables
+from dapple.progress import followed
 from dapple.stability import outcome, stressors
 from dapple.stability.chain import Chain
 from dapple.stability.stressors import UNDISTURBED
@@ -26,7 +27,7 @@ def main(snakemake):
     for step, value in ready.items():
         chain.give(step, UNDISTURBED, value, seconds[step])
     parts = []
-    for level in stressor.chosen(params.levels):
+    for level in followed(stressor.chosen(params.levels), f"levels of {stressor.name}"):
         if level.changes:
             rows = outcome.rows(chain, stressor, level, world, params.reconstructions)
             parts.append(outcome.table(rows))

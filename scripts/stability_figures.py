@@ -7,8 +7,8 @@ from dapple.workflow import run
 
 def main(snakemake):
     points = tables.read(snakemake.input.points)
-    style.save(stability_map.heat_map(points), snakemake.output.map)
-    style.save(stability_map.curves(points), snakemake.output.curves)
+    style.save_both(stability_map.heat_map(points), snakemake.output.map)
+    style.save_both(stability_map.curves(points), snakemake.output.curves)
 
 
 if __name__ == "__main__":

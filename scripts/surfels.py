@@ -11,6 +11,7 @@ def main(snakemake):
     cloud = clouds.read(inputs.cloud)
     fired = shots.iterate(inputs.shots) if inputs.shots else None
     leaves, facts = steps.surfels(cloud, fired, **options(snakemake.params))
+    print(f"{leaves.n_elements:,} discs, {leaves.area_m2:.2f} m²")
     meshes.write_ply(outputs.leaves, leaves, cloud.origin_m)
     truth = json.read(inputs.truth) if inputs.truth else None
     json.write(

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 
+from dapple.progress import followed
 from dapple.streams import stream_seed
 from dapple.survey import designs, grid_files, hemisphere
 from dapple.survey.hemisphere_scanner import Hemisphere
@@ -23,7 +24,7 @@ def main(snakemake):
     places_m = [place for place in places_m if not hemisphere.is_inside_wood(world, place)]
     shape = grid_shape(stand.size_m, settings["voxel_size_m"])
     reach = Reach.empty(shape, settings["voxel_size_m"], dtype=np.uint32)
-    for number, place_m in enumerate(places_m):
+    for number, place_m in enumerate(followed(places_m, "places of a scanner")):
         seed = stream_seed(settings["seed"], "candidate", number)
         for beams in hemisphere.scan(world, stand, place_m, scanner, 1, seed):
             reach.add(beams, np.full(len(beams.range_m), 1 << number))

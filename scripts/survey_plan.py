@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 
 from dapple.formats import netcdf, tables, voxel_grids
+from dapple.progress import followed
 from dapple.streams import stream_seed
 from dapple.survey import fill, plan
 from dapple.workflow import run
@@ -15,9 +16,8 @@ def main(snakemake):
     params = snakemake.params
     rows, places = [], []
     inputs = snakemake.input
-    for (stand, seed), truth_path, scans_path, cells_path in zip(
-        params.truths, inputs.truth, inputs.candidates, inputs.cells, strict=True
-    ):
+    stands = list(zip(params.truths, inputs.truth, inputs.candidates, inputs.cells, strict=True))
+    for (stand, seed), truth_path, scans_path, cells_path in followed(stands, "plans of stands"):
         truth, scans = netcdf.read(truth_path), netcdf.read(scans_path)
         first = voxel_grids.read(cells_path)
         filled = (truth.leaf_area_m2 + truth.wood_area_m2).values > 0

@@ -3,6 +3,7 @@
 import time
 
 from dapple.formats import voxel_grids
+from dapple.progress import followed
 from dapple.streams import stream_seed
 from dapple.structure.voxel_sums import Grid
 from dapple.structure.voxels import plant_area_density
@@ -33,7 +34,7 @@ def main(snakemake):
 
     def shots():
         world = hemisphere.world_of(stand)
-        for number, position_m in enumerate(positions_m):
+        for number, position_m in enumerate(followed(positions_m, "scan positions")):
             seed = stream_seed(settings["seed"], snakemake.wildcards.design, number)
             for beams in hemisphere.scan(world, stand, position_m, scanner, len(positions_m), seed):
                 reach.add(beams)

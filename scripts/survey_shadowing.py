@@ -5,6 +5,7 @@ import pandas as pd
 
 from dapple.formats import netcdf, tables
 from dapple.formats.atomic import atomic
+from dapple.progress import followed
 from dapple.survey import shadow
 from dapple.survey.voxel_status import attribute
 from dapple.workflow import run
@@ -14,7 +15,8 @@ def main(snakemake):
     params = snakemake.params
     rows, profiles, maps = [], [], {}
     truths = {}
-    for (stand, seed, design), path in zip(params.runs, snakemake.input.reach, strict=True):
+    runs = list(zip(params.runs, snakemake.input.reach, strict=True))
+    for (stand, seed, design), path in followed(runs, "designs in stands"):
         if (stand, seed) not in truths:
             at = params.truths.index((stand, seed))
             truth = netcdf.read(snakemake.input.truth[at])

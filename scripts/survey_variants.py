@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from dapple.formats import tables
+from dapple.progress import followed
 from dapple.streams import stream_seed
 from dapple.survey import correction, designs, hemisphere, shadow
 from dapple.survey.hemisphere_scanner import Hemisphere
@@ -47,7 +48,8 @@ def main(snakemake):
     settings = options(snakemake.params)
     rows = []
     for species, stand_settings in settings["stands"].items():
-        for name, (tree, beam, any_face) in VARIANTS.items():
+        variants = followed(list(VARIANTS.items()), f"variants of {species}")
+        for name, (tree, beam, any_face) in variants:
             if tree and tree.items() <= SPECIES[species].items():
                 continue  # that is what the species is like
             stand = stands.grow(species, **stand_settings | tree)

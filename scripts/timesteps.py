@@ -2,6 +2,7 @@
 
 from dapple.formats import netcdf
 from dapple.light import timestep_series
+from dapple.progress import followed
 from dapple.scene import scene_files, scene_optics
 from dapple.workflow import run
 
@@ -16,7 +17,8 @@ def main(snakemake):
         **params.engine,
         seed=params.seed,
     )
-    series = timestep_series.joined(reference.at(index, table) for index in params.positions)
+    positions = followed(list(params.positions), "times by Mitsuba")
+    series = timestep_series.joined(reference.at(index, table) for index in positions)
     netcdf.write(snakemake.output.light, series)
 
 

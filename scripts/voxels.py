@@ -2,6 +2,7 @@
 
 from dapple import steps
 from dapple.formats import clouds, shots, voxel_grids
+from dapple.progress import followed
 from dapple.structure import subvoxel_clumping
 from dapple.workflow import options, run
 
@@ -12,7 +13,9 @@ def main(snakemake):
     correction = settings.pop("correction")
     settings["kinds"] = steps.return_kinds(cloud, settings.pop("majority_voxel_m"))
     size_m = float(snakemake.wildcards.size)
-    density = steps.voxels(shots.iterate(path), cloud, size_m, **settings)
+    n_shots = shots.read_head(path)["n_shots"]
+    fired = followed(shots.iterate(path), "shots through voxels", n_shots, size=len)
+    density = steps.voxels(fired, cloud, size_m, **settings)
     if correction:
         finer_m = correction.pop("finer_m")
         density = subvoxel_clumping.correct(
@@ -22,6 +25,10 @@ def main(snakemake):
             kinds=settings["kinds"],
             **correction,
         )
+    unknown = float(density["plant_area_density_m2_m3"].isnull().mean())
+    print(
+        f"{n_shots:,} shots, {density['flag'].size:,} voxels of {size_m:g} m, {unknown:.1%} unknown"
+    )
     voxel_grids.write(snakemake.output.voxels, density)
     voxel_grids.write_vox(snakemake.output.amapvox, density)
 

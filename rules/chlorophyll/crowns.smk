@@ -96,6 +96,7 @@ rule plot_scene:
         terrain=plot_file("scene/terrain.ply"),
         summary=plot_file("scene/summary.json"),
         picture=plot_file("scene/crowns.png"),
+        vector=plot_file("scene/crowns.pdf"),
     log:
         logs("plot_scene_{plot}"),
     benchmark:

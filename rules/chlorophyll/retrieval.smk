@@ -240,6 +240,7 @@ rule chlorophyll_figures:
         spectra=results("chlorophyll/{plot}_spectra.png"),
         losses=results("chlorophyll/{plot}_losses.png"),
         map=results("chlorophyll/{plot}_map.png"),
+        vectors=vectors(*(f"chlorophyll/{{plot}}_{name}.png" for name in PLOT_FIGURES)),
     log:
         logs("chlorophyll_figures_{plot}"),
     benchmark:

@@ -45,6 +45,7 @@ rule stability_figures:
             category="Stability",
         ),
         curves=results("stability/curves.png"),
+        vectors=vectors("stability/map.png", "stability/curves.png"),
     log:
         logs("stability_figures"),
     benchmark:

@@ -4,7 +4,7 @@ Shadowing: what scans did not see, and how contact frequency is corrected for it
 Needs   survey/{stand}_{replicate}/truth.nc, {design}.nc, {design}_cells.nc; for the figures survey/plan.csv
 Makes   survey/shadowing.csv, filled_profile.csv     relative shadow, profiles of filled voxels
         survey/regression.csv, profile.csv, ...      contact frequency and its correction
-        survey/*.png                                 figures
+        survey/*.png, *.pdf                          figures
 """
 
 
@@ -86,6 +86,19 @@ rule survey_figures:
         regression=results("survey/regression.png"),
         profile=results("survey/profile.png"),
         plan=results("survey/plan.png"),
+        vectors=vectors(
+            *(
+                f"survey/{name}.png"
+                for name in (
+                    "shadowing",
+                    "filled_profile",
+                    "shadow_maps",
+                    "regression",
+                    "profile",
+                    "plan",
+                )
+            )
+        ),
     log:
         logs("survey_figures"),
     benchmark:

@@ -2,6 +2,7 @@
 
 import resource
 import sys
+import time
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr, redirect_stdout
@@ -10,6 +11,10 @@ from typing import Any
 
 from dapple.code_use import files_of
 from dapple.errors import InputError
+from dapple.progress import duration
+
+MOST_NAMED = 6
+"""Of the files that a job made, in its log."""
 
 
 def code_of(script: Path, unused: Sequence[str] = ()) -> tuple[str, ...]:
@@ -32,13 +37,16 @@ def short(path: Path) -> str:
 def run(main: Callable[[Any], None], snakemake: Any) -> None:
     """Run the main function of a script with its output in the rule's log.
 
-    A mistake of the user's (`InputError`) is one message in the log and on the terminal; everything
-    else is a traceback in both. Both end the job.
+    The log ends with what was made, how long it took and with how much memory. A mistake of the
+    user's (`InputError`) is one message in the log and on the terminal; everything else is a
+    traceback in both. Both end the job.
     """
+    begun = time.monotonic()
     with Path(snakemake.log[0]).open("w", buffering=1) as log:
         try:
             with redirect_stdout(log), redirect_stderr(log):
                 main(snakemake)
+                print(_end(snakemake.output, time.monotonic() - begun))
         except InputError as error:
             message = f"dapple: {error}"
             log.write(f"{message}\n")
@@ -46,6 +54,21 @@ def run(main: Callable[[Any], None], snakemake: Any) -> None:
         except Exception:
             log.write(traceback.format_exc())
             raise
+
+
+def _end(output: Sequence[str], seconds: float) -> str:
+    """The last line of a log."""
+    made = [f"{Path(path).name} ({_size(Path(path))})" for path in output]
+    wrote = f": wrote {', '.join(made[:MOST_NAMED])}" if made else ""
+    more = f" and {len(made) - MOST_NAMED} more files" if len(made) > MOST_NAMED else ""
+    return (
+        f"Done in {duration(seconds)} with {peak_rss_mb():.0f} MB of memory at most{wrote}{more}."
+    )
+
+
+def _size(path: Path) -> str:
+    n_bytes = path.stat().st_size
+    return f"{n_bytes / 1e6:.1f} MB" if n_bytes >= 1e5 else f"{n_bytes / 1e3:.1f} kB"
 
 
 def peak_rss_mb() -> float:

@@ -152,13 +152,6 @@ def test_many_causes_are_not_all_listed():
     assert "and 6 more." in telling.sentence([Job("a")], 3, None, edits, is_first=False)
 
 
-@pytest.mark.parametrize(
-    ("seconds", "said"), [(0.2, "1 s"), (40, "40 s"), (200, "3 min"), (7800, "2 h 10 min")]
-)
-def test_durations_are_said_as_people_do(seconds, said):
-    assert telling.duration(seconds) == said
-
-
 def test_jobs_carry_why_they_run_and_what_they_took(tmp_path):
     benchmark = tmp_path / "scan.tsv"
     benchmark.write_text("s\tmax_rss\n12.5\t640\n")

@@ -110,8 +110,17 @@ FIGURES = {
     ),
     "boxplot": lambda: boxplot.draw(per_sensor(), overall()),
     "ground_map": lambda: ground_map.draw(ground(), stem_m=(3, 3)),
+    "ground_map_in_one_row": lambda: ground_map.draw(
+        ground()[:2],
+        sun=pd.DataFrame({"sun_zenith_deg": [30.0, 40.0], "sun_azimuth_deg": [180.0, 200.0]}),
+    ),
     "scatter": lambda: scatter.draw(records(), overall()),
+    "scatter_of_four": lambda: scatter.draw(records("abcd"), overall()),
+    "scatter_of_five": lambda: scatter.draw(records("abcde"), overall()),
 }
+PRINT_WIDTH_IN = 7.1
+"""Of a page of two columns (180 mm)."""
+LEAST_PRINTED_PT = 5.5
 
 
 @pytest.mark.parametrize("name", FIGURES)
@@ -136,6 +145,31 @@ def test_every_figure_names_a_unit_or_a_quantity_without_one(name):
     words = [text.get_text() for text in figure.texts]
     words += [label for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel())]
     assert any(unit in " ".join(words) for unit in ("[m]", f"[{style.PAR_UNIT}]", "Pearson's r"))
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_every_word_can_be_read_in_print(name):
+    figure = FIGURES[name]()
+    shrunk = min(1, PRINT_WIDTH_IN / figure.get_figwidth())
+    figure.draw_without_rendering()
+    words = [one for one in figure.findobj(mpl.text.Text) if one.get_text() and one.get_visible()]
+    assert min(one.get_fontsize() for one in words) * shrunk >= LEAST_PRINTED_PT
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_no_title_or_label_is_cut_off(name):
+    figure = FIGURES[name]()
+    figure.draw_without_rendering()
+    drawn = figure.get_tightbbox()
+    assert min(drawn.x0, drawn.y0) > -0.02
+    assert drawn.x1 < figure.get_figwidth() + 0.02
+    assert drawn.y1 < figure.get_figheight() + 0.02
+
+
+def test_a_figure_lies_as_png_and_pdf(tmp_path):
+    style.save_both(FIGURES["boxplot"](), tmp_path / "boxplot.png")
+    assert (tmp_path / "boxplot.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "boxplot.pdf").read_bytes().startswith(b"%PDF")
 
 
 def test_a_failed_write_leaves_no_file(tmp_path):
@@ -275,17 +309,23 @@ def test_components_are_the_light_that_is_not_direct():
 
 
 def test_sensors_are_chosen_evenly_from_the_darkest_to_the_brightest():
-    light = [50.0, 60, 70, 900, 1000, 1950, *[2000.0 + k for k in range(20)]]
+    light = [50.0, 60, 70, 600, 800, 950, *[2000.0 + k for k in range(20)]]
     shown = pd.DataFrame({"sensor": [f"s{k}" for k in range(len(light))], "measured": light})
+    shown["time"] = TIMES[0]
     chosen = daily_courses.choose_sensors(shown, count=4)
-    assert chosen[0] == "s0"
-    assert chosen[1] in ("s2", "s3")
-    assert sum(float(light[int(one[1:])]) > 1900 for one in chosen) == 1
+    assert chosen == ["s0", "s3", "s4", "s5"]
     assert daily_courses.choose_sensors(shown[:3]) == ["s0", "s1", "s2"]
 
 
+def test_sensors_under_the_open_sky_are_chosen_last():
+    light = [100.0, 900, 2000, 2001, 2002, 2003]
+    shown = pd.DataFrame({"sensor": list("abcdef"), "measured": light, "time": TIMES[0]})
+    assert daily_courses.choose_sensors(shown, count=2) == ["a", "b"]
+    assert daily_courses.choose_sensors(shown, count=3) == ["a", "b", "c"]
+
+
 def test_sensors_are_chosen_where_nothing_was_measured_or_seen():
-    night = pd.DataFrame({"sensor": ["a", "b"] * 2, "simulated": 0.0})
+    night = pd.DataFrame({"sensor": ["a", "b"] * 2, "simulated": 0.0, "time": TIMES[0]})
     assert daily_courses.choose_sensors(night) == ["a", "b"]
 
 

@@ -1,5 +1,6 @@
 """What rules and scripts share: the code that a rule depends on, logs, errors that read well."""
 
+import re
 from types import SimpleNamespace
 
 import pytest
@@ -61,13 +62,30 @@ def test_code_is_named_relative_to_where_the_workflow_runs(monkeypatch):
 
 @pytest.fixture
 def job(tmp_path):
-    return SimpleNamespace(log=[str(tmp_path / "rule.log")], written=tmp_path / "rule.log")
+    made = tmp_path / "tree.laz"
+    made.write_bytes(bytes(250_000))
+    log = tmp_path / "rule.log"
+    return SimpleNamespace(log=[str(log)], written=log, output=[str(made)])
 
 
 def test_what_a_script_prints_goes_to_its_log(job, capsys):
     run(lambda _: print("12 points"), job)
-    assert job.written.read_text() == "12 points\n"
+    assert job.written.read_text().startswith("12 points\n")
     assert capsys.readouterr().out == ""
+
+
+def test_a_log_ends_with_what_was_made_how_long_it_took_and_how_much_memory(job):
+    run(lambda _: None, job)
+    (line,) = job.written.read_text().splitlines()
+    assert re.fullmatch(
+        r"Done in 1 s with \d+ MB of memory at most: wrote tree\.laz \(0\.2 MB\)\.", line
+    )
+
+
+def test_of_many_files_some_are_named(job):
+    job.output *= 9
+    run(lambda _: None, job)
+    assert job.written.read_text().endswith("tree.laz (0.2 MB) and 3 more files.\n")
 
 
 def test_a_mistake_of_the_user_s_ends_the_job_with_one_message(job):

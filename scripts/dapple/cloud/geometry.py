@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 from dapple.cloud import branches, eigenvalues, voxel_groups
 from dapple.errors import EmptyCloudError
 from dapple.formats.clouds import Cloud
+from dapple.progress import followed
 
 LEAST_POINTS = 50
 QUANTUM = 1e-9
@@ -124,7 +125,8 @@ def by_geometry(
             places_m, nodes_m[thick], radius_m[thick], reach_m=2 * size_m
         )
         beyond_m = np.minimum(beyond_m, found)
-    shapes = [eigenvalues.around(places_m, edge * size_m) for edge in NEIGHBOURHOODS]
+    edges = followed(NEIGHBOURHOODS, "sizes of neighbourhoods")
+    shapes = [eigenvalues.around(places_m, edge * size_m) for edge in edges]
     features = np.concatenate([one.shape[one.voxel_of_point] for one in shapes], axis=1)
     alike = eigenvalues.discriminate(features, beyond_m <= 0, beyond_m > size_m)
     wood = DISTANCE_COUNTS * (slack - beyond_m / size_m) + alike > 0

@@ -9,6 +9,7 @@ import numpy as np
 from dapple.cloud import boosted_trees, eigenvalues, voxel_groups
 from dapple.errors import EmptyCloudError
 from dapple.formats.clouds import Cloud
+from dapple.progress import followed
 
 MODEL = Path(__file__).with_name("leaf_wood_model.npz")
 NODE_M = 0.015
@@ -81,7 +82,7 @@ def features(cloud: Cloud, *, reflectance: bool | None = None) -> tuple[np.ndarr
         brightness = groups.total((values - middle) / max(0.5 * (high - low), 1e-3))[:, None]
         brightness = brightness / groups.size[:, None]
     columns = [brightness]
-    for edge_m in EDGES_M:
+    for edge_m in followed(EDGES_M, "sizes of neighbourhoods"):
         found = eigenvalues.around(nodes_m, edge_m, brightness)
         rows = [found.shape, found.mean, found.deviation, found.largest]
         columns.append(np.concatenate(rows, axis=1)[found.voxel_of_point])

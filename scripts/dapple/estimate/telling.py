@@ -4,18 +4,9 @@ from collections.abc import Sequence
 
 from dapple.estimate.forecast import Forecast
 from dapple.estimate.planned import ASKED, INTERRUPTED, MISSING, Job
+from dapple.progress import duration
 
 MOST_CAUSES = 3
-
-
-def duration(seconds: float) -> str:
-    """A duration as people say it: 40 s, 3 min, 2 h 10 min."""
-    if seconds < 90:
-        return f"{max(seconds, 1):.0f} s"
-    minutes = round(seconds / 60)
-    if minutes < 90:
-        return f"{minutes} min"
-    return f"{minutes // 60} h {minutes % 60:02d} min"
 
 
 def sentence(

@@ -25,7 +25,7 @@ def crowns(
     slice_m : float
         Depth of the slice through the middle of the map [m].
     """
-    figure = style.new_figure(10, 4.6)
+    figure = style.new_figure(9.6, 4.6)
     above, side, filled = figure.subplot_mosaic(
         [["map", "points"], ["map", "facets"]], width_ratios=[1, 1.5]
     ).values()

@@ -16,16 +16,20 @@ from dapple.stats import measures
 from dapple.stats.pairs import simulated
 from dapple.timezones import find_timezone
 
+SHADED = 0.5
+"""Light below this share of the brightest sensor's at the time is shade."""
+
 
 def choose_sensors(records: pd.DataFrame, *, count: int = 6) -> list[str]:
     """Pick sensors whose mean light lies evenly between the darkest and the brightest.
 
-    Deep shade, partial shade and open sky are then all there, however many sensors stand in each.
+    Deep and partial shade are then all there, however many sensors stand in each. Sensors that
+    are never shaded show the open sky, and are chosen only where too few others are left.
 
     Parameters
     ----------
     records : DataFrame
-        `sensor` and `measured`, or `simulated` where nothing was measured.
+        `sensor`, `time`, and `measured`, or `simulated` where nothing was measured.
     count : int
         How many; all where there are fewer.
 
@@ -35,9 +39,13 @@ def choose_sensors(records: pd.DataFrame, *, count: int = 6) -> list[str]:
         Darkest first.
     """
     light = records["measured" if "measured" in records else "simulated"]
-    mean = light.groupby(records["sensor"].to_numpy()).mean().dropna().sort_values(kind="stable")
+    sensor = records["sensor"].to_numpy()
+    mean = light.groupby(sensor).mean().dropna().sort_values(kind="stable")
     if len(mean) <= count:
         return list(mean.index)
+    brightest = light.groupby(records["time"].to_numpy()).transform("max")
+    is_shaded = (light < SHADED * brightest).groupby(sensor).any()[mean.index]
+    mean = pd.concat([mean[is_shaded], mean[~is_shaded][: max(0, count - is_shaded.sum())]])
     wanted = np.linspace(mean.iloc[0], mean.iloc[-1], count)
     chosen: list[str] = []
     for value in wanted:
@@ -103,7 +111,7 @@ def draw(
     names = tuple(records["reconstruction"].unique())
     columns = min(columns, len(sensors))
     rows = -(-len(sensors) // columns)
-    figure = style.new_figure(3.1 * columns + 0.4, 1.95 * rows + 0.9)
+    figure = style.new_figure(2.9 * columns + 0.4, 1.95 * rows + 0.9)
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for axes, sensor in zip(panels, sensors, strict=False):
         own = records[records["sensor"] == sensor]

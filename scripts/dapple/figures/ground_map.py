@@ -58,7 +58,7 @@ def draw(
     rows = -(-par.sizes["time"] // columns)
     extent = _extent(par)
     aspect = (extent[3] - extent[2]) / (extent[1] - extent[0])
-    figure = style.new_figure(3.1 * columns + 1.2, 3.1 * aspect * rows + 0.7)
+    figure = style.new_figure(3.1 * columns + 1.2, (3.1 * aspect + 0.35) * rows + 0.9)
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     top = float(par.max())
     for index, axes in enumerate(panels):

@@ -88,7 +88,7 @@ def draw(points: pd.DataFrame) -> Figure:
     points : DataFrame
         As `advice.tradeoff.table` makes it.
     """
-    figure = style.new_figure(10.2, 5.0)
+    figure = style.new_figure(9.6, 5.0)
     panels = figure.subplots(1, 2)
     for axes, error, title in zip(panels, ERRORS, _titles(points), strict=True):
         _panel(axes, points, error)

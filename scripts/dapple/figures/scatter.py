@@ -33,7 +33,7 @@ def draw(records: pd.DataFrame, overall: pd.DataFrame, *, cells: int = 45) -> Fi
         Hexagons along one axis.
     """
     names = tuple(records["reconstruction"].unique())
-    columns = min(len(names), 4)
+    columns = 2 if len(names) == 4 else min(len(names), 3)
     rows = -(-len(names) // columns)
     figure = style.new_figure(2.75 * columns + 1.1, 2.95 * rows + 0.3)
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
@@ -85,7 +85,7 @@ def _numbers(axes: Axes, row: pd.DataFrame) -> None:
         0.03,
         0.97,
         f"r = {values['r']:.2f}{interval}\nRMSE = {values['rmse']:.0f}\n"
-        f"bias = {values['bias']:+.0f}\nn = {values['n']:.0f}",
+        f"bias = {round(values['bias']) or 0:+d}\nn = {values['n']:.0f}",
         transform=axes.transAxes,
         va="top",
         fontsize=8,

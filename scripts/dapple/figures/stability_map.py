@@ -50,7 +50,7 @@ def heat_map(points: pd.DataFrame) -> Figure:
     width = max(len(table) for table in levels.values())
     per_row = 3 if len(titles) > 4 else 2
     n_rows = -(-len(titles) // per_row)
-    figure = style.new_figure(5.2 * per_row, (0.34 * len(names) + 0.9) * n_rows)
+    figure = style.new_figure(4.9 * per_row, (0.34 * len(names) + 0.9) * n_rows)
     grid = figure.subplots(n_rows, per_row, sharey=True, squeeze=False)
     for ax in grid.ravel()[len(titles) :]:
         ax.set_visible(False)
@@ -119,7 +119,7 @@ def curves(points: pd.DataFrame) -> Figure:
     names = [name for name in STRESSORS if (points["stressor"] == name).any()]
     panels = [name for name in PANELS if (points["reconstruction"] == name).any()]
     n_rows = -(-len(names) // COLUMNS)
-    figure = style.new_figure(11.5, 2.4 * n_rows + 0.4)
+    figure = style.new_figure(9.8, 2.4 * n_rows + 0.4)
     grid = figure.subplots(n_rows, COLUMNS, squeeze=False, sharey=True)
     for ax in grid.ravel()[len(names) :]:
         ax.set_visible(False)

@@ -98,6 +98,12 @@ def new_figure(width_in: float, height_in: float) -> Figure:
     return Figure(figsize=(width_in, height_in), dpi=DPI, layout="constrained")
 
 
+def save_both(figure: Figure, path: str | Path) -> None:
+    """Write a picture as PNG, for the screen, and beside it as PDF, for print."""
+    for kind in (".png", ".pdf"):
+        save(figure, Path(path).with_suffix(kind))
+
+
 def save(figure: Figure, path: str | Path) -> None:
     """Write a picture, PNG or PDF by its name, that holds no date and no version of a program."""
     with atomic(path) as partial, mpl.rc_context():

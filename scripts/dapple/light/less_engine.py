@@ -14,6 +14,7 @@ from dapple.formats import netcdf, tables
 from dapple.light import less_files
 from dapple.light.less_files import LessRays
 from dapple.light.light_datasets import dataset
+from dapple.progress import followed
 from dapple.scene.scene_optics import Optics, group_bands, group_flux
 from dapple.scene.surfaces import Scene
 from dapple.sky.sky_radiance import FLUXES
@@ -63,7 +64,7 @@ def series(
     less3.check("light.engine: less")
     sky, optics = in_groups(sky, optics, bands)
     parts = []
-    for placement, scene in enumerate(scenes):
+    for placement, scene in enumerate(followed(scenes, "placements of the leaves by LESS")):
         with tempfile.TemporaryDirectory(prefix="dapple-less-") as folder:
             own = replace(rays, seed=stream_seed(rays.seed, placement))
             less_files.write(Path(folder), scene, optics, sky, sensors, own, aperture_m)

@@ -7,6 +7,7 @@ from dapple.formats.ground_surface import GroundSurface
 from dapple.formats.netcdf import time_coordinate, times
 from dapple.light import series, transport, visibility
 from dapple.light.light_model import Model, simplified
+from dapple.progress import followed
 from dapple.scene.scene_optics import Optics
 from dapple.scene.surfaces import Scene
 from dapple.scene.traced import load
@@ -67,7 +68,7 @@ def par_on_ground(
     points[:, 2] = ground.height_m(points[:, :2]) + LIFT_M
     loaded, kept = load(scene, variant), simplified(sky, optics, MODEL)
     parts = []
-    for first in range(0, len(points), AT_ONCE):
+    for first in followed(range(0, len(points), AT_ONCE), "light on the ground"):
         some = points[first : first + AT_ONCE]
         sunlit = visibility.sunlit(
             loaded,

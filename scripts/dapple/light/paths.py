@@ -13,6 +13,7 @@ import numpy as np
 
 from dapple.optics import sensor_response
 from dapple.optics.responses import COSINE, Response
+from dapple.progress import followed
 from dapple.scene.traced import TracedScene
 
 PLASTIC_STEPS = (3242174889, 2447445414)
@@ -113,7 +114,7 @@ def trace(
     keys = mi.UInt32((np.arange(len(points_m)) if keys is None else keys).astype(np.uint32))
     every = np.repeat(np.arange(len(points_m)), n_paths)
     parts = []
-    for low in range(0, len(every), PATHS_PER_KERNEL):
+    for low in followed(range(0, len(every), PATHS_PER_KERNEL), "paths of light from sensors"):
         start = every[low : low + PATHS_PER_KERNEL]
         number = low + np.arange(len(start)) - (ends - n_paths - first)[start]
         parts.append(_trace_block(scene, points, normals, keys, start, number, response, *fixed))

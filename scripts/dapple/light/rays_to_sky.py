@@ -12,6 +12,7 @@ import numpy as np
 
 from dapple.optics import sensor_response
 from dapple.optics.responses import COSINE, NAMED, Response
+from dapple.progress import Progress
 from dapple.scene import patterns, traced
 from dapple.scene.surfaces import Scene
 from dapple.scene.traced import TracedScene
@@ -36,6 +37,7 @@ def sun_rays(
     aperture_m: float = 0.0,
     facing: np.ndarray | None = None,
     keys: np.ndarray | None = None,
+    progress: Progress | None = None,
 ) -> SunRays:
     """Prepare rays from sensors' entrances to the sun's disc.
 
@@ -57,6 +59,8 @@ def sun_rays(
         Unit normals of the entrances; None: level ones.
     keys : (n,) uint32 or None
         As in `visibility.sunlit`.
+    progress : Progress or None
+        Is told of the rays.
 
     Returns
     -------
@@ -99,6 +103,8 @@ def sun_rays(
         for part in _blocks(len(pairs), n_replicates * n_rays):
             sums[part], square = block(pairs[part], pattern, n_replicates, n_rays)
             squares[part] = square.sum(axis=1)
+            if progress is not None:
+                progress.add((part.stop - part.start) * n_replicates * n_rays)
         return sums, squares
 
     return trace

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dapple.light.rays_to_sky import sun_rays
+from dapple.progress import Progress
 from dapple.scene.traced import TracedScene
 
 FIRST_RAYS = 32
@@ -93,6 +94,7 @@ def sunlit(
     # A point and a parallel beam leave nothing to chance.
     exact = sun_diameter_deg == 0 and aperture_m == 0
     most = 1 if exact else max(-(-max_rays // n_replicates), 1)
+    progress = Progress("rays to the sun's disc", len(up) * most * n_replicates)
     trace = sun_rays(
         scene,
         sensors_m,
@@ -102,6 +104,7 @@ def sunlit(
         seed=seed,
         facing=facing,
         keys=keys,
+        progress=progress,
     )
     pairs, rays = up, min(FIRST_RAYS, most)
     before = 0
@@ -115,6 +118,9 @@ def sunlit(
         agree = share.mean(axis=1) % 1 == 0
         pairs = pairs[error[pairs] > np.where(agree, AGREEING * tolerance, tolerance)]
         before, rays = rays, min(2 * rays, most)
+        # At most so many are left: every further round goes on with fewer pairs.
+        progress.total = progress.done + len(pairs) * (most - before) * n_replicates
+    progress.end()
     share = total / np.maximum(done, 1)[:, None]
     return Sunlit(
         np.moveaxis(share.reshape(n, t, n_replicates), 2, 0),

@@ -10,6 +10,7 @@ from scipy import sparse
 from dapple.errors import InputError
 from dapple.light import brf
 from dapple.light.paths import PLASTIC_STEPS
+from dapple.progress import followed
 from dapple.retrieval import basis
 from dapple.retrieval.coefficients import Coefficients, Window
 from dapple.scene.counters import Counters
@@ -78,7 +79,7 @@ def trace(
     cells = np.zeros((n_replicates, n_cells, 2 * n))
     cut = 0.0
     step = max(1, brf.PATHS_PER_KERNEL // total)
-    for low in range(0, window.n_pixels, step):
+    for low in followed(range(0, window.n_pixels, step), "paths of light from pixels"):
         high = min(low + step, window.n_pixels)
         starts = _starts(scene, window, (low, high), per_set, n_replicates, seed)
         start, kind, source, value, lost = kinds.count(

@@ -13,6 +13,7 @@ import pandas as pd
 
 from dapple.errors import InputError
 from dapple.formats.atomic import atomic
+from dapple.progress import followed
 from dapple.retrieval.noise import Noise
 
 # One thread: sums in one order, so that a seed gives the same weights whatever the machine's cores.
@@ -175,7 +176,7 @@ def train(
     weights = _first_weights(rng, (features.shape[1], *hidden, *[hidden[-1]] * block, 1))
     state = optimizer.init(weights)
     best, best_loss, best_epoch, rows = weights, np.inf, 0, []
-    for epoch in range(1, max_epochs + 1):
+    for epoch in followed(range(1, max_epochs + 1), "epochs, if none is without gain"):
         losses = []
         if noise:
             x = (noise.add(features, rng) - mean) / scale

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from dapple.errors import InputError
+from dapple.progress import followed
 
 MASKS = ("sunlit", "all")
 
@@ -119,7 +120,8 @@ def aggregate(
     flat, n_cells = np.ascontiguousarray(canopy).ravel(), over.shape[0] * over.shape[1]
     sums = count = None
     done = 0
-    for pixels, values in chunks:
+    each = followed(chunks, "pixels of all images", len(flat), size=lambda one: len(one[1]))
+    for pixels, values in each:
         if sums is None:
             sums = np.zeros((len(masks), n_cells, *values.shape[1:]))
             count = np.zeros(sums.shape[:-1], np.int32)

@@ -9,6 +9,7 @@ from dapple.cloud import voxel_groups
 from dapple.errors import EmptyCloudError, InputError
 from dapple.formats import meshes
 from dapple.formats.meshes import Mesh
+from dapple.progress import followed
 from dapple.structure import hulls
 
 HALF_POINT_SPACING_M = math.sqrt(2 * 0.01**2) / 2
@@ -89,7 +90,8 @@ def reconstruct(
         )
     _check_extent(points_m, voxel_size_m, what)
     options = float(voxel_size_m), float(buffer_m), float(mitre_limit), int(seed)
-    parts = [_of_slab(points_m[slab], *options) for slab in slabs(points_m, voxel_size_m)]
+    slices = followed(slabs(points_m, voxel_size_m), f"{what} points", len(points_m), size=len)
+    parts = [_of_slab(points_m[slab], *options) for slab in slices]
     return parts[0] if len(parts) == 1 else meshes.concatenate(parts)
 
 

@@ -15,6 +15,7 @@ from dapple import engine
 from dapple.errors import InputError
 from dapple.formats.meshes import Mesh
 from dapple.frames import direction_from_angles
+from dapple.progress import followed
 from dapple.scene import patterns
 from dapple.scene.mitsuba_plugins import register
 from dapple.scene.mitsuba_scene import dark_sun, sky_emitter, triangles
@@ -186,7 +187,8 @@ def _expose(scene: PaintedScene, view: View, paths: int, seed: int) -> np.ndarra
     sampler = mi.load_dict({"type": "independent"})
     n_pixels, at_once = view.rows * view.columns, max(CHUNK_RAYS // paths, 1)
     radiance = np.empty((3, n_pixels))
-    for number, begin in enumerate(range(0, n_pixels, at_once)):
+    parts = followed(range(0, n_pixels, at_once), "pixels of three bands")
+    for number, begin in enumerate(parts):
         pixel = np.arange(begin, min(begin + at_once, n_pixels))
         own = stream_seed(seed, number)
         row, column = np.divmod(pixel, view.columns)

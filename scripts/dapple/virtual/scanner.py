@@ -8,6 +8,7 @@ from dapple.errors import InputError
 from dapple.formats import shots as shot_files
 from dapple.formats.meshes import Mesh
 from dapple.formats.shots import Shots
+from dapple.progress import followed
 from dapple.streams import stream_seed
 from dapple.virtual.scanner_beam import beam_pattern
 from dapple.virtual.scanner_model import Scanner
@@ -157,7 +158,7 @@ def _chunks_of_beams(
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Position index and direction of the shots to fire, `CHUNK_SHOTS` at a time."""
     waiting, n_waiting = [], 0
-    for index, position in enumerate(positions_m):
+    for index, position in enumerate(followed(positions_m, "scan positions")):
         for direction in grid_directions(
             position,
             low_m,

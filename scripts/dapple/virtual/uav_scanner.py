@@ -9,6 +9,7 @@ import numpy as np
 from dapple.errors import InputError
 from dapple.formats.clouds import Cloud
 from dapple.formats.meshes import Mesh
+from dapple.progress import followed
 from dapple.streams import stream_seed
 from dapple.virtual.scanner_model import Scanner
 from dapple.virtual.scanner_returns import echoes
@@ -224,7 +225,8 @@ def _sweeps(flight: Flight, low_m, high_m, ground_z_m, seed) -> Iterator[Pulses]
     # Crowns stand above the ground: beams that pass over the edge may still meet them.
     length_m = high_m[1] - low_m[1] + 10.0
     n_sweeps, at_once, number = int(np.ceil(length_m * per_metre / n_across)), 256, 0
-    for line, x in enumerate(lines_m(flight, low_m, high_m), start=1):
+    lines = followed(lines_m(flight, low_m, high_m), "flight lines")
+    for line, x in enumerate(lines, start=1):
         start = np.array([x, 0.5 * (low_m[1] + high_m[1]), ground_z_m + flight.height_m])
         begun_s = (line - 1) * (length_m / flight.speed_m_s + TURN_S)
         for begin in range(0, n_sweeps, at_once):
