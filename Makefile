@@ -63,4 +63,4 @@ site: setup
 	$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
 
 lock: setup
-	$(BIN)/uv pip compile pyproject.toml --extra cluster --group dev --generate-hashes --universal --no-header --quiet -o requirements.lock
+	$(BIN)/uv pip compile pyproject.toml --extra cluster --extra storage --group dev --generate-hashes --universal --no-header --quiet -o requirements.lock

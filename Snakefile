@@ -10,6 +10,7 @@ configfile: f"{workflow.current_basedir}/config/config.yaml"
 
 include: "rules/common.smk"
 include: "rules/targets.smk"
+include: "rules/download.smk"
 include: "rules/check.smk"
 include: "rules/scan.smk"
 include: "rules/cloud.smk"

@@ -147,6 +147,12 @@ REPORT_TEMPLATES = [
     for file in sorted((SCRIPTS / "dapple/report/templates").iterdir())
 ]
 
+# What data_dir lacks and a server has.
+MISSING_DATA = {
+    path: checksum
+    for path, checksum in settings.download.sha256.items()
+    if settings.download.url and not (Path(settings.data_dir) / path).is_file()
+}
 # What this run reads of data_dir.
 DATA_FILES = []
 
@@ -154,7 +160,7 @@ DATA_FILES = []
 def data(path):
     """A file of real data, which the configuration names relative to data_dir."""
     file = Path(settings.data_dir) / path
-    if not file.is_file():
+    if not file.is_file() and path not in MISSING_DATA:
         published = (
             "`tools/apple-data CLONE` lays them out from a clone of JulFrey/dotshadow. "
         )

@@ -19,6 +19,7 @@ from dapple.config.classify import Classify
 from dapple.config.clean import Clean
 from dapple.config.cloud import CloudInput
 from dapple.config.corrections import Corrections
+from dapple.config.download import Download
 from dapple.config.explain import explain
 from dapple.config.figures import Figures
 from dapple.config.leaves import Leaves
@@ -57,6 +58,7 @@ class Settings(Section):
     )
     seed: Annotated[int, Ge(0)] = key(1, "every random number of the run derives from it")
     data_dir: str = key("../shared/data", "folder of real data; only real experiments read it")
+    download: Download = Download()
     source: Literal["auto", "virtual", "wood", "cloud"] = key(
         "auto",
         "a virtual tree and scan, real wood with virtual leaves, or a point cloud; auto: as "
