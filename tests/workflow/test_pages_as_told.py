@@ -21,6 +21,7 @@ ELSEWHERE = (
     "config/mine.yaml",
     "config/RUN.yaml",
     "--profile",
+    "--default-storage-provider",
     "--sdm",
     "--report",
     "--touch",
