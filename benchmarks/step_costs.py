@@ -216,7 +216,7 @@ def main() -> None:
     found = pd.DataFrame(rows)
     print(found.to_string(index=False))
     if options.docs:
-        found.to_csv(options.docs / "estimate.csv", index=False, float_format="%.3g")
+        found.to_csv(options.docs / "estimate.csv", index=False, float_format="%.4g")
 
 
 def in_folder(keys: dict, folder: Path) -> Settings:

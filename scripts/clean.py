@@ -12,7 +12,14 @@ def main(snakemake):
     cloud, counts = clean(
         clouds.read(inputs.points), where=inputs.points, ground=ground, **settings
     )
-    print(*(f"{step.replace('_', ' ')}: {n:,} points" for step, n in counts.items()), sep="\n")
+    print(
+        *(
+            f"{step.replace('_', ' ')}: {n:,} points"
+            for step, n in counts.items()
+            if isinstance(n, int)
+        ),
+        sep="\n",
+    )
     clouds.write(snakemake.output.cloud, cloud)
     json.write(snakemake.output.counts, counts)
 

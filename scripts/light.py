@@ -51,7 +51,8 @@ def main(snakemake):
     ]
     light = light_datasets.as_dataset(series.mean(placements), table["sensor"], netcdf.times(sky))
     frame = georeference.read(inputs.cloud, inputs.registration, **params.world)
-    print(*(f"{name}: mean {float(part.mean()):.1f}" for name, part in light.items()), sep="\n")
+    mean = float(light["par_umol_m2_s"].mean())
+    print(f"{len(table)} sensors, {light.sizes['time']} times, mean PAR {mean:.0f} µmol m⁻² s⁻¹")
     sun_files.write(snakemake.output.sun, suns, identities)
     netcdf.write(snakemake.output.light, placed_light.at_sensors(light, table, frame))
 

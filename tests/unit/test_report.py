@@ -9,9 +9,10 @@ import pytest
 import yaml
 
 from dapple import findings
-from dapple.report import methods, run_report
+from dapple.report import blocks, methods, numbers, run_report
 from dapple.report.blocks import Section, Text, number, table
 from dapple.report.document import document
+from dapple.report.quantities import quantity
 from dapple.report.recommendation import sentences
 from dapple.report.references import REFERENCES
 from dapple.verdict.signal_meanings import SIGNALS
@@ -246,3 +247,29 @@ def test_studies_without_a_verdict_open_with_what_they_found(tmp_path):
     )  # fmt: skip
     page = written(tmp_path / "plot", {"chlorophyll/accuracy.csv": accuracy})
     assert "nearest to 12 trees comes semi less with an RMSE of 4.00" in page
+
+
+def test_a_long_table_is_folded_and_says_how_many_rows_it_has():
+    rows = [[blocks.cell(k)] for k in range(blocks.MOST_ROWS + 1)]
+    long, short = (
+        blocks.Table("Light of a day", [quantity("n")], part) for part in (rows, rows[:-1])
+    )
+    page = document("a run", [], [Section("Light", [long, short])])
+    assert page.count("<details") == 1
+    assert f"<summary>Light of a day ({len(rows)} rows)</summary>" in page
+
+
+def test_what_only_some_reconstructions_have_is_told_row_by_row(tmp_path):
+    for name, facts in {
+        "polygons": {"leaf_area_m2": 70.0, "voxel_size_m": 0.05},
+        "voxels_0.2": {"leaf_area_m2": 80.0, "total_shots": 3},
+    }.items():
+        folder = tmp_path / "structure" / name
+        folder.mkdir(parents=True)
+        (folder / "summary.json").write_text(json.dumps(facts))
+    all_of_them, single = numbers.structure(tmp_path)
+    assert [column.label for column in all_of_them.columns] == ["reconstruction", "leaf area"]
+    assert [[cell.text for cell in row] for row in single.rows] == [
+        ["polygons", "voxel size", "0.0500", "m"],
+        ["voxels 0.2 m", "total shots", "3", ""],
+    ]

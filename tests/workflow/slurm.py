@@ -23,7 +23,7 @@ SlurmctldLogFile={folder}/controller.log
 SlurmdLogFile={folder}/node.log
 ProctrackType=proctrack/linuxproc
 TaskPlugin=task/none
-JobAcctGatherType=jobacct_gather/none
+JobAcctGatherType=jobacct_gather/{gather}
 AccountingStorageType=accounting_storage/none
 SelectType=select/cons_tres
 SelectTypeParameters=CR_Core_Memory
@@ -42,17 +42,31 @@ def lacking() -> str:
     return f"no {', '.join(absent)}: apt-get install slurm-wlm munge" if absent else ""
 
 
+LIMITED = """
+JobAcctGatherFrequency=task=1
+JobAcctGatherParams=OverMemoryKill
+"""
+"""Jobs that take more memory than they asked for are killed."""
+
+
 @contextmanager
-def cluster(folder: Path) -> Iterator[dict[str, str]]:
-    """A running Slurm; gives the environment in which its programs find it."""
+def cluster(folder: Path, *, is_limited: bool = False) -> Iterator[dict[str, str]]:
+    """A running Slurm; gives the environment in which its programs find it.
+
+    Where it is limited, it kills jobs that take more memory than they asked for.
+    """
     for name in ("controller", "node"):
         (folder / name).mkdir(parents=True)
     memory_mb = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") * 9 // 10 // 2**20
     configuration = folder / "slurm.conf"
     text = CONFIGURATION.format(
-        host=socket.gethostname(), folder=folder, cores=os.cpu_count(), memory_mb=memory_mb
+        host=socket.gethostname(),
+        folder=folder,
+        cores=os.cpu_count(),
+        memory_mb=memory_mb,
+        gather="linux" if is_limited else "none",
     )
-    configuration.write_text(text)
+    configuration.write_text(text + LIMITED * is_limited)
     environment = os.environ | {"SLURM_CONF": str(configuration)}
     _munge()
     try:

@@ -98,6 +98,33 @@ def _cancel_first(environment):
 
 
 @pytest.mark.long
+def test_a_job_without_enough_memory_is_killed_and_gets_more_at_the_next_attempt(tmp_path):
+    if lacking := slurm.lacking():
+        pytest.skip(lacking)
+    folder = copy_of_project(tmp_path / "dapple").folder
+    script, rules = folder / "scripts/plant.py", folder / "rules/scan.smk"
+    # 900 MB, and a while for Slurm to see it.
+    greedy = (
+        "def main(snakemake):\n    held = b'x' * 900_000_000\n    time.sleep(8)\n    del held\n"
+    )
+    script.write_text(
+        script.read_text()
+        .replace("def main(snakemake):\n", greedy)
+        .replace('"""\n', '"""\n\nimport time\n', 1)
+    )
+    text = rules.read_text()
+    rules.write_text(re.sub(r"(rule plant:.*?memory\()\d+", r"\g<1>900", text, flags=re.DOTALL))
+    with slurm.cluster(tmp_path / "slurm", is_limited=True) as environment:
+        run = started(
+            folder, environment, "results/virtual-apple-small/structure/truth/leaves_0.ply"
+        )
+        said, _ = run.communicate(timeout=600)
+    assert len(jobs(said)) == 2, said[-6000:]
+    assert re.search("OUT_OF_ME|CANCELLED|FAILED", said)
+    assert "(100%) done" in said, said[-4000:]
+
+
+@pytest.mark.long
 def test_a_submission_that_fails_is_reported_and_made_again(cluster, tmp_path):
     folder = copy_of_project(tmp_path / "dapple").folder
     broken = tmp_path / "bin/sbatch"

@@ -14,6 +14,8 @@ from dapple.report.quantities import Quantity, quantity
 
 EMPTY = "–"
 """Stands where nothing is known."""
+MOST_ROWS = 25
+"""Longer tables are folded."""
 NAMES = ("reconstruction", "step")
 """Columns of names that the project gave, unlike labels of the input."""
 
@@ -61,6 +63,11 @@ class Table:
     rows: Sequence[Sequence[Cell]]
     note: str = ""
     kind: str = "table"
+
+    @property
+    def is_folded(self) -> bool:
+        """Whether it is so long that only its title is shown until it is asked for."""
+        return len(self.rows) > MOST_ROWS
 
 
 @dataclass(frozen=True)

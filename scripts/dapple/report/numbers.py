@@ -1,5 +1,6 @@
 """Numbers of a run as tables, each where its file is there."""
 
+import math
 from collections.abc import Iterator, Mapping
 from json import loads
 from pathlib import Path
@@ -8,8 +9,8 @@ import pandas as pd
 
 from dapple.figures import pareto_chart, style
 from dapple.formats import json, tables
-from dapple.report.blocks import Block, Chart, Table, table
-from dapple.report.quantities import CHLOROPHYLL, REFLECTANCE, Quantity
+from dapple.report.blocks import Block, Cell, Chart, Table, cell, table
+from dapple.report.quantities import CHLOROPHYLL, QUANTITIES, REFLECTANCE, Quantity, quantity
 
 COMPARED = {
     "statistics/overall.csv": (
@@ -78,8 +79,27 @@ def structure(folder: Path) -> Iterator[Block]:
     found = pd.DataFrame(facts).T
     plain = [name for name in found if found[name].map(_is_plain).all()]
     found = found[plain].infer_objects()
-    found.insert(0, "reconstruction", found.index)
-    yield table(found, "What the scan was rebuilt as", named=style.label)
+    shared = found[[name for name in found if name in QUANTITIES]].copy()
+    shared.insert(0, "reconstruction", shared.index)
+    yield table(shared, "What the scan was rebuilt as", named=style.label)
+    if rows := _of_some(found.drop(columns=[name for name in found if name in QUANTITIES])):
+        columns = [quantity(name) for name in ("reconstruction", "quantity", "value", "unit")]
+        yield Table("What else is known of single reconstructions", columns, rows)
+
+
+def _of_some(found: pd.DataFrame) -> list[list[Cell]]:
+    """What some reconstructions have, a row for each: as columns, most cells would be empty."""
+    return [
+        [
+            cell(style.label(str(name))),
+            cell(about.label),
+            cell(value, 0 if isinstance(value, int | float) and value % 1 == 0 else about.digits),
+            cell(about.unit),
+        ]
+        for name, row in found.iterrows()
+        for about, value in ((quantity(str(one)), value) for one, value in row.items())
+        if value is not None and not (isinstance(value, float) and math.isnan(value))
+    ]
 
 
 def _is_plain(value: object) -> bool:

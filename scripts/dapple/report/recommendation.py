@@ -105,6 +105,8 @@ def blocks(verdict: Mapping[str, Any]) -> list[Block]:
     for name in sorted(judged, key=lambda name: judged[name]["expected_loss"]):
         facts = judged[name]
         score = f"Expected loss {facts['expected_loss']:.2f}, alarm from {facts['alarm']:.2f}."
+        if name == "surfels":
+            score += " Judged by the signs of polygons, which are rebuilt from the same points."
         if facts["state"] == "green" and facts["reasons"]:
             score += " What speaks most against it is still usual:"
         reasons = [f"{_capital(_reason(one))}. {one['help']}" for one in facts["reasons"]]
