@@ -5,11 +5,45 @@ Needs   config/config.yaml, merged with the file given as --configfile
 Makes   nothing
 """
 
+import os
 import sys
+import tarfile
+import tempfile
 from pathlib import Path
 
-# Where dapple itself lies: results go to the working directory, which may be elsewhere.
-HOME = Path(str(workflow.current_basedir)).parent
+
+def home():
+    """Where dapple itself lies: results go to the working directory, which may be elsewhere.
+
+    A module that was taken from a server by `github(...)` has no folder: all of it is laid out
+    beside Snakemake's own copy of the repository, once for each commit.
+    """
+    rules = workflow.current_basedir
+    if not hasattr(rules, "hosted_repo"):
+        return Path(str(rules)).parent
+    commit = rules.hosted_repo.repo.commit(rules.ref)
+    folder = Path(rules.cache_path) / "dapple" / commit.hexsha
+    if not folder.is_dir():
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder.parent) as partial:
+            with tempfile.TemporaryFile() as packed:
+                commit.repo.archive(packed, commit.hexsha)
+                packed.seek(0)
+                tarfile.open(fileobj=packed).extractall(f"{partial}/all", filter="data")
+            try:
+                os.rename(f"{partial}/all", folder)
+            except OSError:
+                if not folder.is_dir():  # else another run was first
+                    raise
+    paths = [
+        str(folder / "scripts"),
+        *os.environ.get("PYTHONPATH", "").split(os.pathsep),
+    ]
+    os.environ["PYTHONPATH"] = os.pathsep.join(path for path in paths if path)
+    return folder
+
+
+HOME = home()
 SCRIPTS = HOME / "scripts"
 sys.path.append(str(SCRIPTS))
 

@@ -4,10 +4,11 @@ import os
 import subprocess
 import sys
 from importlib import metadata
+from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
-from tests.workflow.project import ENVIRONMENT, ROOT, SMALL, jobs
+from tests.workflow.project import ENVIRONMENT, ROOT, SMALL, copy_of_project, jobs
 
 STEPS = {"plant", "scan", "clean", "classify", "polygons", "voxels", "light", "verdict", "page"}
 CHEAP = "results/virtual-apple-small/structure/truth/summary.json"
@@ -75,6 +76,46 @@ def test_another_workflow_can_take_dapple_as_a_module(tmp_path, prefix):
     if prefix:
         snakemake(tmp_path, "--", f"under/{CHEAP}")
         assert (tmp_path / "under" / CHEAP).is_file()
+
+
+def git(folder, *arguments):
+    subprocess.run(["git", *arguments], cwd=folder, check=True, capture_output=True, timeout=60)
+
+
+@pytest.fixture
+def hub(tmp_path):
+    """A folder that git takes for github.com, with dapple as it stands here as owner/dapple."""
+    folder = copy_of_project(tmp_path / "hub/owner/dapple").folder
+    (folder / ".tools").unlink(missing_ok=True)
+    person = ("-c", "user.name=nobody", "-c", "user.email=nobody@example.org")
+    for arguments in (
+        ("init", "-q"),
+        ("add", "-A"),
+        (*person, "commit", "-qm", "all"),
+        ("tag", "v1"),
+    ):
+        git(folder, *arguments)
+    return {
+        "GIT_CONFIG_COUNT": "1",
+        "GIT_CONFIG_KEY_0": f"url.file://{tmp_path}/hub/.insteadOf",
+        "GIT_CONFIG_VALUE_0": "https://github.com/",
+        "XDG_CACHE_HOME": str(tmp_path / "cache"),
+    }
+
+
+def test_snakedeploy_writes_a_workflow_that_runs_without_a_clone(tmp_path, hub):
+    deploy = [Path(sys.executable).with_name("snakedeploy"), "deploy-workflow"]
+    mine = tmp_path / "mine"
+    subprocess.run(
+        [*deploy, "https://github.com/owner/dapple", mine, "--tag", "v1"],
+        env=ENVIRONMENT | hub,
+        check=True,
+        capture_output=True,
+        timeout=120,
+    )
+    assert "github(" in (mine / "workflow/Snakefile").read_text()
+    snakemake(mine, "--configfile", SMALL, "--", CHEAP, **hub)
+    assert (mine / CHEAP).is_file()
 
 
 # What Snakemake's own process needs

@@ -26,8 +26,8 @@ def cluster(tmp_path):
         yield environment
 
 
-def started(folder, environment, *more):
-    command = [sys.executable, "-m", "snakemake", *ARGUMENTS, *ONE_NODE, *more, *LITTLE]
+def started(folder, environment, *targets):
+    command = [sys.executable, "-m", "snakemake", *ARGUMENTS, *ONE_NODE, *LITTLE, "--", *targets]
     return subprocess.Popen(
         command,
         cwd=folder,
