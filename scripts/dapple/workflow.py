@@ -68,7 +68,9 @@ def _end(output: Sequence[str], seconds: float) -> str:
 
 def _size(path: Path) -> str:
     n_bytes = path.stat().st_size
-    return f"{n_bytes / 1e6:.1f} MB" if n_bytes >= 1e5 else f"{n_bytes / 1e3:.1f} kB"
+    units = {"MB": 1e6, "kB": 1e3, "B": 1.0}
+    unit = next((one for one, size in units.items() if n_bytes >= size), "B")
+    return f"{n_bytes / units[unit]:.{0 if unit == 'B' else 1}f} {unit}"
 
 
 def peak_rss_mb() -> float:

@@ -63,7 +63,7 @@ def test_code_is_named_relative_to_where_the_workflow_runs(monkeypatch):
 @pytest.fixture
 def job(tmp_path):
     made = tmp_path / "tree.laz"
-    made.write_bytes(bytes(250_000))
+    made.write_bytes(bytes(1_500_000))
     log = tmp_path / "rule.log"
     return SimpleNamespace(log=[str(log)], written=log, output=[str(made)])
 
@@ -78,14 +78,14 @@ def test_a_log_ends_with_what_was_made_how_long_it_took_and_how_much_memory(job)
     run(lambda _: None, job)
     (line,) = job.written.read_text().splitlines()
     assert re.fullmatch(
-        r"Done in 1 s with \d+ MB of memory at most: wrote tree\.laz \(0\.2 MB\)\.", line
+        r"Done in 1 s with \d+ MB of memory at most: wrote tree\.laz \(1\.5 MB\)\.", line
     )
 
 
 def test_of_many_files_some_are_named(job):
     job.output *= 9
     run(lambda _: None, job)
-    assert job.written.read_text().endswith("tree.laz (0.2 MB) and 3 more files.\n")
+    assert job.written.read_text().endswith("tree.laz (1.5 MB) and 3 more files.\n")
 
 
 def test_a_mistake_of_the_user_s_ends_the_job_with_one_message(job):

@@ -1,5 +1,6 @@
 """A whole run on a real Slurm of one node; jobs that are cancelled, fail or lack memory."""
 
+import json
 import os
 import re
 import subprocess
@@ -38,6 +39,41 @@ def started(folder, environment, *targets):
     )
 
 
+SUBMISSIONS = """
+import json
+import sys
+from pathlib import Path
+
+import yaml
+from snakemake.api import SnakemakeApi
+from snakemake.settings.types import (
+    ConfigSettings, GroupSettings, OutputSettings, Quietness, ResourceSettings,
+)
+
+profile = yaml.safe_load(Path("profiles/slurm/config.v9+.yaml").read_text())
+groups = GroupSettings(profile["groups"], profile["group-components"])
+resources = ResourceSettings(
+    cores=profile["cores"], nodes=profile["jobs"], max_threads=profile["max-threads"],
+    resources=profile["resources"], overwrite_resources=profile["set-resources"],
+)
+quiet = OutputSettings(dryrun=True, quiet={Quietness.ALL}, enable_file_logging=False)
+with SnakemakeApi(quiet) as api:
+    asked = api.workflow(
+        resources,
+        config_settings=ConfigSettings(
+            configfiles=[Path(sys.argv[1])], config=json.loads(sys.argv[2])
+        ),
+        snakefile=Path("Snakefile"),
+    )
+    asked.dag().execute_workflow(executor="dryrun", group_settings=groups)
+    dag = asked._workflow.dag
+    found = [(job, dag.get_job_group(job) or job) for job in dag.needrun_jobs(False)]
+    sent = {id(group): group for job, group in found if job.output}
+    print([len(found), len(sent), max(group.resources["runtime"] for group in sent.values())])
+"""
+"""Counts jobs, submissions to Slurm, and the longest time that one asks for [min]."""
+
+
 def jobs(said):
     return re.findall(r"submitted with SLURM jobid (\d+)", said)
 
@@ -71,6 +107,26 @@ def test_a_run_is_at_most_eight_jobs(cluster, tmp_path):
     assert "(100%) done" in said, said[-4000:]
     assert (folder / "results/virtual-apple-small/report.html").is_file()
     assert len(jobs(said)) <= 8
+
+
+@pytest.mark.long
+def test_a_thousand_jobs_of_light_are_few_submissions_of_a_time_that_clusters_grant():
+    every_minute = {
+        "time": {"step_min": 1},
+        "light": {"timestep": {"step_min": 1, "times_per_job": 1}},
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", SUBMISSIONS, SMALL, json.dumps(every_minute)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=1200,
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    n_jobs, n_submissions, longest_min = json.loads(done.stdout.splitlines()[-1])
+    assert n_jobs > 1000
+    assert n_submissions <= 50
+    assert longest_min <= 3 * 24 * 60
 
 
 @pytest.mark.long

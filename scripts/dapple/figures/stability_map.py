@@ -48,9 +48,9 @@ def heat_map(points: pd.DataFrame) -> Figure:
     ]
     levels = {name: _level_order(points, name) for name in names}
     width = max(len(table) for table in levels.values())
-    per_row = 3 if len(titles) > 4 else 2
+    per_row = 2  # what stands in the cells can be read in print
     n_rows = -(-len(titles) // per_row)
-    figure = style.new_figure(4.9 * per_row, (0.34 * len(names) + 0.9) * n_rows)
+    figure = style.new_figure(4.9 * per_row, (0.42 * len(names) + 0.8) * n_rows)
     grid = figure.subplots(n_rows, per_row, sharey=True, squeeze=False)
     for ax in grid.ravel()[len(titles) :]:
         ax.set_visible(False)
@@ -72,7 +72,7 @@ def heat_map(points: pd.DataFrame) -> Figure:
         ax.set(title=title, xticks=[], yticks=range(len(names)))
         ax.set_yticklabels([STRESSORS[name].title for name in names])
         ax.tick_params(length=0)
-        if column == "r" or index == len(titles) - 1:
+        if index % per_row == per_row - 1 or index == len(titles) - 1:
             figure.colorbar(image, ax=ax, label="r" if column == "r" else "F1", shrink=0.8)
     return figure
 
@@ -101,9 +101,10 @@ def _write(ax, values, labels, failed, norm) -> None:
         colour = "white" if lightness < 0.5 else "black"
         number = f"{value:.2f}" if np.isfinite(value) else "none"
         mark = " ✕" if failed is not None and failed[row, k] else ""
-        ax.text(k, row - 0.17, labels[row, k], ha="center", va="center", fontsize=5.5,
+        size = 7.6 if len(labels[row, k]) < 8 else 5.8  # words are longer than numbers
+        ax.text(k, row - 0.21, labels[row, k], ha="center", va="center", fontsize=size,
                 color=colour)  # fmt: skip
-        ax.text(k, row + 0.2, f"{number}{mark}", ha="center", va="center", fontsize=6.5,
+        ax.text(k, row + 0.22, f"{number}{mark}", ha="center", va="center", fontsize=7.6,
                 color=colour, weight="bold" if mark else "normal")  # fmt: skip
 
 
@@ -139,11 +140,11 @@ def curves(points: pd.DataFrame) -> Figure:
         ax.axvline(harmless, color="#BBBBBB", lw=3, zorder=0)
         ax.set_title(STRESSORS[name].title, fontsize=8)
         turned = {"rotation": 20, "ha": "right"} if max(map(len, levels["label"])) > 6 else {}
-        ax.set_xticks(range(len(levels)), levels["label"], fontsize=6.5, **turned)
+        ax.set_xticks(range(len(levels)), levels["label"], fontsize=7.6, **turned)
         ax.grid(axis="x", visible=False)
     for ax in grid[:, 0]:
         ax.set_ylabel("r")
     lowest = np.floor(10 * max(points["r"].min(), 0)) / 10
     grid[0, 0].set_ylim(lowest, 1.0)
-    grid[0, 0].legend(fontsize=6.5, loc="lower right")
+    grid[0, 0].legend(fontsize=7.6, loc="lower right")
     return figure
