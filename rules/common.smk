@@ -5,7 +5,6 @@ Needs   config/config.yaml, merged with the file given as --configfile
 Makes   nothing
 """
 
-import os
 import sys
 import tarfile
 import tempfile
@@ -31,15 +30,10 @@ def home():
                 packed.seek(0)
                 tarfile.open(fileobj=packed).extractall(f"{partial}/all", filter="data")
             try:
-                os.rename(f"{partial}/all", folder)
+                Path(partial, "all").rename(folder)
             except OSError:
                 if not folder.is_dir():  # else another run was first
                     raise
-    paths = [
-        str(folder / "scripts"),
-        *os.environ.get("PYTHONPATH", "").split(os.pathsep),
-    ]
-    os.environ["PYTHONPATH"] = os.pathsep.join(path for path in paths if path)
     return folder
 
 
@@ -57,7 +51,10 @@ from dapple.estimate.sizes import sizes
 from dapple.optics import responses
 from dapple.streams import stream_seed
 from dapple.structure.voxel_sizes import finer_than
-from dapple.workflow import code_of, evenly, short
+from dapple.workflow import code_of, evenly, let_jobs_import, short
+
+if hasattr(workflow.current_basedir, "hosted_repo"):
+    let_jobs_import(SCRIPTS)
 
 try:
     settings = validate(

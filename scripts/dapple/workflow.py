@@ -1,5 +1,6 @@
 """What Snakemake's rules and scripts need: code dependencies, logs, and errors that read well."""
 
+import os
 import resource
 import sys
 import time
@@ -32,6 +33,12 @@ def short(path: Path) -> str:
     """
     here = Path.cwd()
     return str(path.relative_to(here) if path.is_relative_to(here) else path)
+
+
+def let_jobs_import(scripts: Path) -> None:
+    """Let jobs import dapple from a folder that is not the one of their scripts."""
+    known = os.environ.get("PYTHONPATH", "")
+    os.environ["PYTHONPATH"] = f"{scripts}{os.pathsep}{known}" if known else str(scripts)
 
 
 def run(main: Callable[[Any], None], snakemake: Any) -> None:
