@@ -198,6 +198,20 @@ def test_a_table_of_another_day_is_refused(tmp_path):
         radiation_series.broadband(AFTERNOON, FREIBURG, kind="table", path=path)
 
 
+@pytest.mark.parametrize(
+    ("step_min", "is_alike"), [(10, False), (15, True), (18, True), (60, False)]
+)
+def test_a_unit_that_looks_nearly_like_watts_is_named_where_none_is_stated(
+    tmp_path, step_min, is_alike
+):
+    index = pd.date_range("2023-08-10 10:00", periods=4, freq=f"{step_min}min")
+    for unit in ("", " [W/m2]"):
+        rows = "".join(f"{time},500\n" for time in index)
+        path = table_file(tmp_path, rows, header=f"time_utc,global{unit}")
+        said = [one.found for one in radiation_table.read(path).findings]
+        assert any("kJ/m2 over" in one for one in said) == (is_alike and not unit)
+
+
 # --- doubt --------------------------------------------------------------------------------------
 
 STATIONS = {

@@ -171,6 +171,17 @@ def irradiance_factor(unit: str, interval_min: float | None, where: str) -> floa
     return _factor(unit, POWERS, ENERGIES, interval_min, where)
 
 
+def like_power(interval_min: float) -> list[str]:
+    """Sums over an interval whose numbers are within a fifth of those of W m⁻², but not the same.
+
+    Haze and calibration make as much of a difference, so no check can tell them.
+    """
+    if not interval_min > 0.0:
+        return []
+    factors = {unit: joules / (60.0 * interval_min) for unit, joules in ENERGIES.items()}
+    return [unit for unit, one in factors.items() if 0.02 < abs(one - 1.0) < 0.2]
+
+
 def photon_factor(unit: str, interval_min: float | None, where: str) -> float:
     """What a value has to be multiplied by to be µmol m⁻² s⁻¹; see `irradiance_factor`."""
     return _factor(unit, PHOTONS, PHOTON_SUMS, interval_min, where)

@@ -137,6 +137,9 @@ def read(
         noticed += doubt
         step = length_min or said.interval_min or source.interval_min or _step_min(table)
         table[kind] *= units.irradiance_factor(used[kind] or "W/m2", step, where)
+        if not used[kind] and (alike := units.like_power(step)):
+            text = f"no unit, taken for W/m2: {alike[0]} over {step:g} min looks nearly the same"
+            noticed.append(findings.note(where, text))
         if used[kind] in units.ILLUMINANCES:
             noticed.append(
                 findings.warning(
