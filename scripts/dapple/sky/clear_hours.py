@@ -6,6 +6,8 @@ import numpy as np
 
 SUN_DEG = 5.0
 """Lower than this the clear-sky model says too little."""
+BLOCK_MIN = 5.0
+"""Rows that are closer are averaged: sensors are noisy within seconds."""
 SPELL_ROWS, SPELL_MIN = 3, 90.0
 """A spell is so many rows, and so many minutes, at least."""
 STEADY = 0.02
@@ -58,6 +60,13 @@ def level(
     step_min : float
         Step between rows [min].
     """
+    block = max(1, round(BLOCK_MIN / step_min)) if step_min > 0 else 1
+    if block > 1:
+        whole = len(ratio) // block * block
+        ratio, elevation_deg = (
+            one[:whole].reshape(-1, block).mean(axis=1) for one in (ratio, elevation_deg)
+        )
+        day, step_min = day[:whole:block], block * step_min
     is_up = (elevation_deg > SUN_DEG) & np.isfinite(ratio)
     if not is_up.any() or not np.isfinite(step_min):
         return None

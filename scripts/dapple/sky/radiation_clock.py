@@ -209,8 +209,8 @@ def _light_at_night(radiation: Radiation, site: Site, lopsided: Finding | None) 
         f"{total[row]:.0f} W m⁻² at {radiation.table.index[row]}, with the sun "
         f"{zenith[row] - 90.0:.0f}° below the horizon",
         "light by day",
-        "Check `radiation.timezone`, the date, and latitude and longitude of the site."
-        + (f" {lopsided.remedy}" if lopsided else ""),
+        "Check `radiation.timezone`, the date, and latitude and longitude of the site; remove rows "
+        "that are faults of the sensor." + (f" {lopsided.remedy}" if lopsided else ""),
     )
 
 

@@ -126,7 +126,9 @@ class _Odd:
 def _odd_energy(radiation: Radiation, rows: Rows, clear: ClearLevel | None) -> _Odd | None:
     """Energy that no weather gives: of the best day, of an hour, or of all clear hours."""
     days = day_ratios(rows)
-    if days.empty:
+    # Where clear hours are as bright as they should be, a day beyond them is a fault of its rows.
+    is_right = clear is not None and LEAST_OF_CLEAR_DAY < clear.ratio < MOST_OF_CLEAR_DAY
+    if days.empty or is_right:
         return None
     best = float(days.max())
     if best > MOST_OF_CLEAR_DAY:
