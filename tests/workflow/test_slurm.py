@@ -68,10 +68,10 @@ with SnakemakeApi(quiet) as api:
     asked.dag().execute_workflow(executor="dryrun", group_settings=groups)
     dag = asked._workflow.dag
     found = [(job, dag.get_job_group(job) or job) for job in dag.needrun_jobs(False)]
-    sent = {id(group): group for job, group in found if job.output}
-    print([len(found), len(sent), max(group.resources["runtime"] for group in sent.values())])
+    sent = {id(group) for job, group in found if job.output}
+    print([len(found), len(sent)])
 """
-"""Counts jobs, submissions to Slurm, and the longest time that one asks for [min]."""
+"""Counts jobs and submissions to Slurm."""
 
 
 def jobs(said):
@@ -110,7 +110,7 @@ def test_a_run_is_at_most_eight_jobs(cluster, tmp_path):
 
 
 @pytest.mark.long
-def test_a_thousand_jobs_of_light_are_few_submissions_of_a_time_that_clusters_grant():
+def test_a_thousand_jobs_of_light_are_few_submissions():
     every_minute = {
         "time": {"step_min": 1},
         "light": {"timestep": {"step_min": 1, "times_per_job": 1}},
@@ -123,10 +123,9 @@ def test_a_thousand_jobs_of_light_are_few_submissions_of_a_time_that_clusters_gr
         timeout=1200,
     )
     assert done.returncode == 0, done.stderr[-3000:]
-    n_jobs, n_submissions, longest_min = json.loads(done.stdout.splitlines()[-1])
+    n_jobs, n_submissions = json.loads(done.stdout.splitlines()[-1])
     assert n_jobs > 1000
     assert n_submissions <= 50
-    assert longest_min <= 3 * 24 * 60
 
 
 @pytest.mark.long
