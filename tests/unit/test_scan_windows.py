@@ -77,7 +77,7 @@ def test_a_tilt_that_the_table_states_is_taken_out():
         misses(cloud, table())
 
 
-@pytest.mark.parametrize("step_deg", [0.25, 0.7, 1.3])
+@pytest.mark.parametrize("step_deg", [0.25, 0.7, 1.3, 2.4, 3.0, 5.0])
 def test_the_steps_between_shots_are_read_from_the_points(step_deg):
     xyz, _ = scanned(SCANNER, step_deg)
     frame = scan_windows.frame_of(xyz - SCANNER, (0.0, 0.0, 0.0), "a.laz")

@@ -4,8 +4,12 @@ import numpy as np
 
 SUBSET = 40_000
 AZIMUTH_BINS = 1 << 19
-SMALLEST_STEP_DEG, LARGEST_STEP_DEG = 0.01, 2.0
+SMALLEST_STEP_DEG, LARGEST_STEP_DEG = 0.01, 10.0
+LARGEST_IN_SPECTRUM_DEG = 2.0
+"""Below this many turns a spectrum shows the widths of trunks and crowns as well as steps."""
 LEAST_COHERENCE = 0.2
+LEAST_LINES = 10
+"""Fewer may fall on every second line by chance."""
 
 
 def find_azimuth_step(azimuth: np.ndarray) -> float:
@@ -28,7 +32,7 @@ def find_azimuth_step(azimuth: np.ndarray) -> float:
     # Padded: a window of azimuths is no full turn, and its steps no whole part of one.
     spectrum = np.abs(np.fft.rfft(count, 4 * AZIMUTH_BINS)) / len(turned)
     cycles = np.arange(len(spectrum)) / 4.0
-    first, last = (int(4 * 360.0 / step) for step in (LARGEST_STEP_DEG, SMALLEST_STEP_DEG))
+    first, last = (int(4 * 360.0 / step) for step in (LARGEST_IN_SPECTRUM_DEG, SMALLEST_STEP_DEG))
     spectrum = spectrum[: last + 1]
     highest = float(spectrum[first:].max())
     if highest < LEAST_COHERENCE:
@@ -37,7 +41,24 @@ def find_azimuth_step(azimuth: np.ndarray) -> float:
     # The first strong one begins a peak: its top lies within a turn's share of the window.
     width = max(4, int(4 * 2 * np.pi / max(_span(turned), 0.05)))
     top = strong + int(np.argmax(spectrum[strong : strong + width]))
-    return float(2 * np.pi / cycles[top])
+    return _of_lines_in_use(turned, float(2 * np.pi / cycles[top]))
+
+
+def _of_lines_in_use(turned: np.ndarray, step: float) -> float:
+    """The step between lines that hold points, where that is a multiple of `step` [rad].
+
+    A step beyond the spectrum shows there by its half, third and so on, the largest within it.
+    """
+    if step < np.radians(0.45 * LARGEST_IN_SPECTRUM_DEG):
+        return step
+    phase = np.angle(np.exp(2j * np.pi * turned / step).mean()) / (2 * np.pi)
+    line = np.rint(turned / step - phase).astype(np.int64)
+    for multiple in range(int(np.radians(LARGEST_STEP_DEG) / step), 1, -1):
+        held = np.bincount(line % multiple, minlength=multiple)
+        used = np.unique(line[line % multiple == held.argmax()])
+        if held.max() > 0.95 * len(line) and len(used) >= LEAST_LINES:
+            return step * multiple
+    return step
 
 
 def find_zenith_step(zenith: np.ndarray, line: np.ndarray) -> float:
