@@ -68,6 +68,14 @@ def test_a_sound_tree_has_no_fault_and_is_described(tmp_path):
     assert {row["what"]: row["able"] for row in check["can"]}["voxels"] is False
 
 
+def test_a_tree_on_ground_far_wider_than_it_is_high_stands_upright(tmp_path):
+    rng = np.random.default_rng(9)
+    far_m, turn = np.exp(rng.uniform(0.0, 5.0, 20_000)), rng.uniform(0, 2 * np.pi, 20_000)
+    ground = np.column_stack([far_m * np.sin(turn), far_m * np.cos(turn), np.zeros(20_000)])
+    wide = Cloud(np.concatenate([one_tree().xyz_m, ground]))
+    assert not [one for one in look(tmp_path, wide)["findings"] if " up" in one["found"]]
+
+
 @pytest.mark.parametrize(
     ("cloud", "sections", "level", "message"),
     [

@@ -19,6 +19,8 @@ MANY_DUPLICATES = 0.01
 ROUNDED_M = 0.004
 """Steps of coordinates from which on points fall on each other by themselves."""
 SLENDER = 0.12
+ON_GROUND = 0.9
+"""Of the ground plan with points near the ground: from this share on the ground itself is there."""
 OTHER_AXES = {
     "y": "y up",
     "-z": "z down",
@@ -81,6 +83,9 @@ def up(facts: CloudFacts, settings: dict, path: str | Path) -> Iterator[Finding]
     if facts.ground.found_by == "ground class" or not is_a_plot(facts.cloud.xyz_m):
         return
     some = facts.cloud.select(slice(None, None, max(1, len(facts.cloud) // 50_000)))
+    above, plan = _heights_and_plan(some)
+    if _cells(plan[above < 0.1 * np.quantile(above, 0.995)]) > ON_GROUND * _cells(plan):
+        return
     slender = {axis: slenderness(selection.turned_up(some, axis)) for axis in OTHER_AXES}
     axis = min(slender, key=lambda one: slender[one])
     if slender[axis] < SLENDER and slenderness(some) > 2.5 * slender[axis]:
@@ -95,14 +100,23 @@ def up(facts: CloudFacts, settings: dict, path: str | Path) -> Iterator[Finding]
 
 def slenderness(cloud: Cloud) -> float:
     """Ground plan of the part from a tenth to a third of the height, over that of all."""
+    above, plan = _heights_and_plan(cloud)
+    top = float(np.quantile(above, 0.995))
+    low = (above >= 0.1 * top) & (above < 0.33 * top)
+    whole = _cells(plan[above >= 0.1 * top])
+    return _cells(plan[low]) / whole if whole and low.any() else 1.0
+
+
+def _heights_and_plan(cloud: Cloud) -> tuple[np.ndarray, np.ndarray]:
+    """Heights above the ground [m], and the cells of the ground plan (n, 2) that points are in."""
     surface = ground_finder.find(cloud)
     above = cloud.xyz_m[:, 2] - surface.height_m(cloud.xyz_m[:, :2])
-    top = float(np.quantile(above, 0.995))
     cell = max(0.02 * float(np.ptp(cloud.xyz_m, axis=0).max()), 1e-6)
-    plan = np.floor(cloud.xyz_m[:, :2] / cell).astype(np.int64)
-    low = (above >= 0.1 * top) & (above < 0.33 * top)
-    whole = len(np.unique(plan[above >= 0.1 * top], axis=0))
-    return len(np.unique(plan[low], axis=0)) / whole if whole and low.any() else 1.0
+    return above, np.floor(cloud.xyz_m[:, :2] / cell).astype(np.int64)
+
+
+def _cells(plan: np.ndarray) -> int:
+    return len(np.unique(plan, axis=0))
 
 
 def heights(facts: CloudFacts, settings: dict, path: str | Path) -> Iterator[Finding]:

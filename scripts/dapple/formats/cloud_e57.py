@@ -172,6 +172,9 @@ def _read_scan(file: pye57.E57, number: int) -> Scan:
     cell = found.pop("cell", None)
     grid = _grid(header, bounds, len(xyz) + invalid + at_scanner)
     attributes = {name: _typed(name, values) for name, values in found.items()}
+    if grid is not None and "NumberOfReturns" not in attributes:
+        place_in_grid = (cell - grid[0]) @ [grid[1][1], 1]
+        attributes |= _numbered(place_in_grid, np.linalg.norm(xyz, axis=1))
     return Scan(
         xyz,
         attributes,
@@ -228,6 +231,18 @@ def _cartesian(spherical: np.ndarray) -> np.ndarray:
     return np.stack(
         [across * np.cos(azimuth), across * np.sin(azimuth), range_m * np.sin(elevation)], axis=1
     )
+
+
+def _numbered(cell: np.ndarray, range_m: np.ndarray) -> dict[str, np.ndarray]:
+    """Return numbers where records share a cell of column and row: returns of one shot."""
+    _, shot, count = np.unique(cell, return_inverse=True, return_counts=True)
+    if len(count) == len(cell) or count.max() > 255:
+        return {}
+    order = np.lexsort((range_m, shot))
+    first = np.concatenate([[0], np.cumsum(count)[:-1]])
+    number = np.empty(len(cell), np.uint8)
+    number[order] = np.arange(len(cell)) - first[shot[order]] + 1
+    return {"ReturnNumber": number, "NumberOfReturns": count[shot].astype(np.uint8)}
 
 
 def _our_name(name: str) -> str:

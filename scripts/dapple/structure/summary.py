@@ -54,8 +54,8 @@ def of_voxels(dataset: xr.Dataset, wood: Mesh | None = None, truth: dict | None 
     Returns
     -------
     dict
-        `leaf_area_m2` (sum of density times volume over known voxels), `wood_area_m2`,
-        `n_elements` and `volume_m3` of voxels with leaves, `mean_pad_m2_m3` of these,
+        `leaf_area_m2` (sum of density times volume over known voxels), `wood_area_m2` where wood
+        is given, `n_elements` and `volume_m3` of voxels with leaves, `mean_pad_m2_m3` of these,
         `leaf_area_m2_by` each estimator, `n_unknown` (of these `n_not_reached`), `n_capped`,
         `total_shots`, `total_misses` and, where the truth is known, `true_leaf_area_m2`.
     """
@@ -70,7 +70,7 @@ def of_voxels(dataset: xr.Dataset, wood: Mesh | None = None, truth: dict | None 
     return {
         # Densities for light, which account for clumps, do not add up to the leaf area.
         "leaf_area_m2": dataset.attrs.get("leaf_area_before_m2", voxel_area_m2(dataset)),
-        "wood_area_m2": wood.area_m2 if wood else 0.0,
+        **({"wood_area_m2": wood.area_m2} if wood is not None else {}),
         "n_elements": int(leafy.sum()),
         "volume_m3": float(leafy.sum() * voxel_m3),
         "mean_pad_m2_m3": float(pad[leafy].mean(dtype=np.float64)) if leafy.any() else 0.0,
