@@ -97,6 +97,14 @@ def polygons(folder: Path, n: int) -> None:
     json.write(folder / "summary.json", facts)
 
 
+def surfels(folder: Path, n: int) -> None:
+    """From the points alone: shots, which come chunk by chunk, add no memory to speak of."""
+    cloud = clouds.read(folder / "classes.laz")
+    settings = SETTINGS.surfels.model_dump() | {"max_deviation": SETTINGS.clean.max_deviation}
+    leaves, _ = steps.surfels(cloud, None, seed=1, **settings)
+    meshes.write_ply(folder / "surfels.ply", leaves, cloud.origin_m)
+
+
 def crown(folder: Path, n: int) -> None:
     """A classified cloud of points at random where the returns of `fired` are, and shots."""
     rng = np.random.default_rng(1)
@@ -177,8 +185,11 @@ STAGES = {
     "clean": cleaned,
     "classify": classified,
     "polygons": polygons,
+    "surfels": surfels,
 }
-READ = {"clean": "ingested.laz", "classify": "clean.laz", "polygons": "classes.laz"}
+READ = {"clean": "ingested.laz", "classify": "clean.laz"} | dict.fromkeys(
+    ("polygons", "surfels"), "classes.laz"
+)
 """What stages read; those before them the points."""
 
 

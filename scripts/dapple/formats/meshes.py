@@ -106,6 +106,21 @@ def of_discs(discs: np.ndarray, n_sides: int = 12) -> Mesh:
         Corners of a polygon, at least 3.
     """
     n = len(discs)
+    vertices_m = np.empty((n, n_sides, 3))
+    for start in range(0, n, PIECE):
+        vertices_m[start : start + PIECE] = _rims(discs[start : start + PIECE], n_sides)
+    step = np.arange(1, n_sides - 1, dtype=np.int32)
+    fan = np.stack([np.zeros_like(step), step, step + 1], axis=1)
+    faces = np.arange(n, dtype=np.int32)[:, None, None] * np.int32(n_sides) + fan
+    return Mesh(
+        vertices_m.reshape(-1, 3),
+        faces.reshape(-1, 3),
+        np.repeat(np.arange(n, dtype=np.int32), n_sides - 2),
+    )
+
+
+def _rims(discs: np.ndarray, n_sides: int) -> np.ndarray:
+    """(n, sides, 3) corners of regular polygons as large as discs [m]."""
     normal = discs[:, 4:]
     helper = np.eye(3)[np.abs(normal).argmin(axis=1)]
     across = np.cross(normal, helper)
@@ -115,15 +130,7 @@ def of_discs(discs: np.ndarray, n_sides: int = 12) -> Mesh:
     reach = discs[:, 0] * np.sqrt(2 * np.pi / (n_sides * np.sin(turn)))
     angle = np.arange(n_sides) * turn
     rim = across[:, None] * np.cos(angle)[:, None] + along[:, None] * np.sin(angle)[:, None]
-    vertices = discs[:, None, 1:4] + reach[:, None, None] * rim
-    step = np.arange(1, n_sides - 1)
-    fan = np.stack([np.zeros_like(step), step, step + 1], axis=1)
-    faces = np.arange(n)[:, None, None] * n_sides + fan
-    return Mesh(
-        vertices.reshape(-1, 3),
-        faces.reshape(-1, 3).astype(np.int32),
-        np.repeat(np.arange(n, dtype=np.int32), n_sides - 2),
-    )
+    return discs[:, None, 1:4] + reach[:, None, None] * rim
 
 
 def concatenate(meshes: list[Mesh]) -> Mesh:

@@ -1,6 +1,7 @@
 """The plane that the points around each point agree on, however many surfaces pass by."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numba import njit, prange
@@ -14,21 +15,31 @@ LEAST_SINE = 0.25
 """Neighbours seen at a smaller angle from the point say too little about a plane."""
 LEAST_WIDTH = 0.02
 """Variance across points over that along them, below which they are a line."""
+PIECE = 500_000
+"""Points whose neighbours are held at a time: 31 of each take half a kilobyte."""
 
 
-def neighbours(points_m: np.ndarray, most: int, reach_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """The nearest points around each point.
+def neighbours(
+    points_m: np.ndarray, most: int, reach_m: float
+) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
+    """The nearest points around each point, a piece of the points at a time.
 
-    Returns
-    -------
-    index : (n, most) int32
+    Yields
+    ------
+    piece : slice
+        Of the points.
+    index : (p, most) int32
         Near to far; n where there are fewer.
-    distance : (n, most) float32
+    distance : (p, most) float32
         [m], infinite where there are fewer.
     """
     tree = cKDTree(points_m)
-    distance, index = tree.query(points_m, most + 1, distance_upper_bound=reach_m, workers=2)
-    return index[:, 1:].astype(np.int32), distance[:, 1:].astype(np.float32)
+    for start in range(0, len(points_m), PIECE):
+        piece = slice(start, start + PIECE)
+        distance, index = tree.query(
+            points_m[piece], most + 1, distance_upper_bound=reach_m, workers=2
+        )
+        yield piece, index[:, 1:].astype(np.int32), distance[:, 1:].astype(np.float32)
 
 
 @njit(cache=True)
@@ -93,37 +104,16 @@ def _best_try(q, weight, count, width, best):
 
 
 @njit(cache=True, parallel=True)
-def fit(points, index, distance, reach, width):
-    """The plane around each point.
-
-    Parameters
-    ----------
-    points : (n, 3) float64
-        [m]
-    index, distance
-        As `neighbours` gives them.
-    reach : float
-        Neighbours farther away do not count; near ones count most [m].
-    width : float
-        Points this far from a plane agree with it by exp(-1/2) [m].
-
-    Returns
-    -------
-    normal : (n, 3) float64
-        Unit vectors, or zero where neighbours span no plane.
-    offset : (n,) float64
-        From the point to its plane along the normal [m].
-    support : (n,) float64
-        Sum of the weights of points that agree; 0 without a plane.
-    """
-    n, k = index.shape
-    normals, offsets, support = np.zeros((n, 3)), np.zeros(n), np.zeros(n)
-    for i in prange(n):
+def _fit_piece(points, at, index, distance, reach, width):  # pragma: no cover (compiled)
+    """As `fit`, for points `at` (p, 3) with their neighbours among `points`."""
+    p, k = index.shape
+    normals, offsets, support = np.zeros((p, 3)), np.zeros(p), np.zeros(p)
+    for i in prange(p):
         q, weight, near = np.empty((k + 1, 3)), np.empty(k + 1), np.empty(k + 1)
         count = 0
         for j in range(k):
-            if index[i, j] < n and distance[i, j] < reach and distance[i, j] > 0.0:
-                q[count] = points[index[i, j]] - points[i]
+            if index[i, j] < len(points) and distance[i, j] < reach and distance[i, j] > 0.0:
+                q[count] = points[index[i, j]] - at[i]
                 weight[count] = math.exp(-2.0 * (distance[i, j] / reach) ** 2)
                 count += 1
         normal, offset = np.zeros(3), 0.0
@@ -141,4 +131,37 @@ def fit(points, index, distance, reach, width):
                 break
         normals[i], support[i] = normal, agreed
         offsets[i] = _agreement(q, weight, count, normal, 0.0, width)[1]
+    return normals, offsets, support
+
+
+def fit(
+    points_m: np.ndarray, most: int, reach_m: float, width_m: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The plane around each point.
+
+    Parameters
+    ----------
+    points_m : (n, 3) float64
+        [m]
+    most : int
+        Nearest points that tell of a plane.
+    reach_m : float
+        Neighbours farther away do not count; near ones count most [m].
+    width_m : float
+        Points this far from a plane agree with it by exp(-1/2) [m].
+
+    Returns
+    -------
+    normal : (n, 3) float64
+        Unit vectors, or zero where neighbours span no plane.
+    offset : (n,) float64
+        From the point to its plane along the normal [m].
+    support : (n,) float64
+        Sum of the weights of points that agree; 0 without a plane.
+    """
+    normals, offsets, support = (np.empty((len(points_m), *s)) for s in ((3,), (), ()))
+    for piece, index, distance in neighbours(points_m, most, reach_m):
+        normals[piece], offsets[piece], support[piece] = _fit_piece(
+            points_m, points_m[piece], index, distance, reach_m, width_m
+        )
     return normals, offsets, support

@@ -97,9 +97,9 @@ def reconstruct(
             "surfels", "no leaf points in the cloud", "at least one", "Check the classes."
         )
     reach_m = _reach_m(points_m, reach_spacings, noise_m)
-    index, distance = local_planes.neighbours(points_m, NEIGHBOURS, reach_m)
-    width_m = AGREEMENT_NOISES * noise_m
-    normal, offset, support = local_planes.fit(points_m, index, distance, reach_m, width_m)
+    normal, offset, support = local_planes.fit(
+        points_m, NEIGHBOURS, reach_m, AGREEMENT_NOISES * noise_m
+    )
     drawn_m = points_m + offset[:, None] * normal
     kept = _thinned(drawn_m, support, spacing_m)
     centre, normal = drawn_m[kept], normal[kept]
@@ -132,16 +132,18 @@ def reconstruct(
 
 def _reach_m(points_m: np.ndarray, spacings: float, noise_m: float) -> float:
     """How far the surface of a point is looked for: farther than noise, not farther than leaves."""
-    _, nearest_m = local_planes.neighbours(points_m, 1, LARGEST_REACH_M)
-    usual_m = float(np.median(nearest_m))
+    found = local_planes.neighbours(points_m, 1, LARGEST_REACH_M)
+    usual_m = float(np.median(np.concatenate([nearest_m for *_, nearest_m in found])))
     return min(max(spacings * usual_m, LEAST_REACH_NOISES * noise_m), LARGEST_REACH_M)
 
 
 def _thinned(points_m: np.ndarray, support: np.ndarray, spacing_m: float) -> np.ndarray:
     """Indices of the points of most support in each voxel, in their order."""
     voxel = np.floor(points_m / spacing_m).astype(np.int64)
+    voxel -= voxel.min(axis=0)
+    cell = np.ravel_multi_index(tuple(voxel.T), tuple(voxel.max(axis=0) + 1))
     order = np.argsort(-support, kind="stable")
-    _, first = np.unique(voxel[order], axis=0, return_index=True)
+    _, first = np.unique(cell[order], return_index=True)
     return np.sort(order[first])
 
 
@@ -149,14 +151,15 @@ def _radius(
     points_m: np.ndarray, normal: np.ndarray, reach_m: float, near_m: float, spacing_m: float
 ) -> np.ndarray:
     """Radius of the circle as large as each point's share of its surface [m]."""
-    index, distance = local_planes.neighbours(points_m, 2 * RING, reach_m)
-    found = index < len(points_m)
-    to = points_m[np.where(found, index, 0)] - points_m[:, None]
-    on_surface = found & (np.abs(np.einsum("nkj,nj->nk", to, normal)) < near_m)
-    rank = np.cumsum(on_surface, axis=1)
-    number = np.minimum(rank[:, -1], RING)
-    at = np.argmax(rank >= np.maximum(number, 1)[:, None], axis=1)
-    ring_m = distance[np.arange(len(points_m)), at].astype(np.float64)
+    number, ring_m = np.empty(len(points_m), np.int64), np.empty(len(points_m))
+    for piece, index, distance in local_planes.neighbours(points_m, 2 * RING, reach_m):
+        found = index < len(points_m)
+        to = points_m[np.where(found, index, 0)] - points_m[piece, None]
+        on_surface = found & (np.abs(np.einsum("nkj,nj->nk", to, normal[piece])) < near_m)
+        rank = np.cumsum(on_surface, axis=1)
+        number[piece] = np.minimum(rank[:, -1], RING)
+        at = np.argmax(rank >= np.maximum(number[piece], 1)[:, None], axis=1)
+        ring_m[piece] = distance[np.arange(len(at)), at]
     # The circle through neighbour k holds the point, k - 1 neighbours and half of the last.
     radius = np.where(number > 0, ring_m / np.sqrt(number + 0.5), np.nan)
     usual = np.nanmedian(radius) if (number > 0).any() else spacing_m / np.sqrt(np.pi)
