@@ -237,6 +237,20 @@ def test_a_truncated_file_is_an_error(tmp_path, suffix, share):
         clouds.read(cut)
 
 
+@pytest.mark.parametrize("suffix", [".las", ".ply", ".pcd"])
+def test_a_file_that_lacks_its_last_byte_is_an_error(tmp_path, suffix):
+    path = tmp_path / f"a{suffix}"
+    if suffix == ".pcd":
+        head = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nPOINTS 50\nDATA binary\n"
+        path.write_bytes(head.encode() + np.ones(150, "<f4").tobytes())
+    else:
+        clouds.write(path, some_cloud(n=50))
+    assert len(clouds.read(path)) == 50
+    path.write_bytes(path.read_bytes()[:-1])
+    with pytest.raises(InputError, match=rf"a{suffix}: found"):
+        clouds.read(path)
+
+
 def test_a_truncated_ptx_is_an_error(tmp_path):
     (tmp_path / "a.ptx").write_text(PTX.format(*UTM).rsplit("\n", 2)[0])
     with pytest.raises(InputError, match="3 of the 4 shots of scan 1"):

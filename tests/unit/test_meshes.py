@@ -111,6 +111,7 @@ def test_the_bark_of_the_published_apple_tree():
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no face"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "vertex 4"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 1\n", "2 corners"),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf \n", "face 2 with 0 corners"),
         ("v 0 0 0\nv 1 0\nf 1 2 3\n", "line 2"),
     ],
 )

@@ -85,8 +85,10 @@ def _checked(
         )
     corners = np.array(numbers, np.int64)
     last = np.cumsum(count) - 1
-    first = last - count + 1
-    closed = (count > 1) & (vertices[corners[first]] == vertices[corners[last]]).all(axis=1)
+    several = np.flatnonzero(count > 1)
+    first = (last - count + 1)[several]
+    closed = np.zeros(len(count), bool)
+    closed[several] = (vertices[corners[first]] == vertices[corners[last[several]]]).all(axis=1)
     corners, count = np.delete(corners, last[closed]), count - closed
     if count.min() < 3:
         raise InputError(
