@@ -98,7 +98,7 @@ def polygons(folder: Path, n: int) -> None:
 
 
 def surfels(folder: Path, n: int) -> None:
-    """From the points alone: shots, which come chunk by chunk, add no memory to speak of."""
+    """From the points alone: a hundred million shots, kept by direction, would take 9 GB more."""
     cloud = clouds.read(folder / "classes.laz")
     settings = SETTINGS.surfels.model_dump() | {"max_deviation": SETTINGS.clean.max_deviation}
     leaves, _ = steps.surfels(cloud, None, seed=1, **settings)

@@ -110,9 +110,10 @@ def surfels(
     EmptyCloudError
         No point is leaf.
     """
-    leaf_m = cloud.xyz_m[cloud.attributes["Classification"] == LEAF]
     shots = [shots] if isinstance(shots, Shots) else shots
-    return discs.reconstruct(leaf_m, shots, seed=seed, **settings)
+    return discs.reconstruct(
+        cloud.xyz_m[cloud.attributes["Classification"] == LEAF], shots, seed=seed, **settings
+    )
 
 
 def voxels(

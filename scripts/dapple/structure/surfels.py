@@ -101,9 +101,10 @@ def reconstruct(
         points_m, NEIGHBOURS, reach_m, AGREEMENT_NOISES * noise_m
     )
     drawn_m = points_m + offset[:, None] * normal
+    del points_m, offset  # of large clouds, arrays go when they are done with
     kept = _thinned(drawn_m, support, spacing_m)
-    centre, normal = drawn_m[kept], normal[kept]
-    is_alone = support[kept] == 0
+    centre, normal, is_alone = drawn_m[kept], normal[kept], support[kept] == 0
+    del drawn_m, support, kept
     chance = np.random.default_rng(seed).normal(size=(int(is_alone.sum()), 3))
     normal[is_alone] = chance / np.linalg.norm(chance, axis=1, keepdims=True)
     radius = _radius(centre, normal, reach_m, ON_SURFACE_NOISES * noise_m, spacing_m)
@@ -125,9 +126,10 @@ def reconstruct(
         share = np.where(np.isnan(share), 1.0, share)
         facts |= {"shots_per_disc": float(weight.mean()), "hit_share": float(share.mean())}
         radius *= np.sqrt(share)
+    discs = np.column_stack([radius, centre, normal])
+    del centre, normal
     is_there = radius > 0
-    discs = np.column_stack([radius, centre, normal])[is_there]
-    return meshes.of_discs(discs, SIDES), facts
+    return meshes.of_discs(discs if is_there.all() else discs[is_there], SIDES), facts
 
 
 def _reach_m(points_m: np.ndarray, spacings: float, noise_m: float) -> float:
