@@ -274,6 +274,18 @@ def test_series_are_drawn_at_their_hour_in_utc_and_tell_the_local_one():
     assert "UTC on 10 August 2023 (local time: UTC +2 h" in figure.get_supxlabel()
 
 
+def test_the_name_of_a_sensor_is_not_written_over_by_the_r_of_five_reconstructions():
+    names = list("abcde")
+    sensors_r = pd.DataFrame({"reconstruction": names, "sensor": "1_1", "r": 0.89})
+    data = records("abcde")
+    figure = daily_courses.draw(data, ["1_1"] * 3, timezone="UTC", per_sensor=sensors_r)
+    FigureCanvasAgg(figure).draw()
+    axes = figure.axes[0]
+    title = next(one for one in (axes.title, axes._left_title) if one.get_text())
+    boxes = [one.get_window_extent() for one in (title, *axes.texts)]
+    assert not any(boxes[0].overlaps(other) for other in boxes[1:])
+
+
 def test_no_line_crosses_missing_records():
     data = records()
     data = data[~data["time"].between(TIMES[10], TIMES[19])]

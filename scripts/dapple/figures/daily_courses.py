@@ -18,6 +18,8 @@ from dapple.timezones import find_timezone
 
 SHADED = 0.5
 """Light below this share of the brightest sensor's at the time is shade."""
+R_APART_POINTS = 21
+"""Between the r of two reconstructions: five of them leave room for the sensor's name."""
 
 
 def choose_sensors(records: pd.DataFrame, *, count: int = 6) -> list[str]:
@@ -175,7 +177,7 @@ def _write_r(axes: Axes, rows: pd.DataFrame, names: tuple[str, ...]) -> None:
             text,
             (1, 1),
             xycoords="axes fraction",
-            xytext=(-27 * place, 4),
+            xytext=(-R_APART_POINTS * place, 4),
             textcoords="offset points",
             ha="right",
             fontsize=8,
