@@ -25,6 +25,29 @@ def survey_small(folder: Path) -> dict[str, pd.DataFrame]:
     return {"survey_small_shadowing": pd.read_csv(folder / "survey" / "shadowing.csv")}
 
 
+def survey(folder: Path) -> dict[str, pd.DataFrame]:
+    """Means over the stands of a species: shadow, contact frequency, correction and planner."""
+    tables = {
+        name: pd.read_csv(folder / "survey" / f"{name}.csv")
+        for name in ("shadowing", "regression", "correction", "plan")
+    }
+    keys = {
+        "shadowing": ["design", "n_beams"],
+        "regression": ["design", "coverage_class"],
+        "correction": ["factors_from", "quantity", "design"],
+        "plan": ["n_scans", "planner"],
+    }
+    found = {}
+    for name, table in tables.items():
+        means = table.drop(columns="seed", errors="ignore").groupby(
+            ["stand", *keys[name]], sort=False
+        )
+        wide = means.mean(numeric_only=True).unstack("stand")
+        wide.columns = ["_".join(names) for names in wide.columns]
+        found[f"survey_{name}"] = wide.reset_index()
+    return found
+
+
 def agreement_with_truth(folder: Path) -> pd.DataFrame:
     """How light under each reconstruction compares with records, and its leaf area [m²]."""
     table = pd.read_csv(folder / "statistics" / "overall.csv")
@@ -123,6 +146,7 @@ def scaling(folder: Path) -> dict[str, pd.DataFrame]:
 REAL_RUNS = ("apple", "leafy-tree", "single-scan", "pine-plot")
 RUNS: dict[str, Callable[[Path], dict[str, pd.DataFrame]]] = {
     "survey-small": survey_small,
+    "survey": survey,
     "virtual-apple": virtual_apple,
     "apple": apple,
     "stability": stability_tables.tables,
