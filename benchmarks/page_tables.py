@@ -13,6 +13,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import stability_tables
 import yaml
@@ -45,7 +46,19 @@ def survey(folder: Path) -> dict[str, pd.DataFrame]:
         wide = means.mean(numeric_only=True).unstack("stand")
         wide.columns = ["_".join(names) for names in wide.columns]
         found[f"survey_{name}"] = wide.reset_index()
-    return found
+    return found | of_five_scans(found["survey_shadowing"])
+
+
+def of_five_scans(shadowing: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """How much less a diamond leaves than one scan of as many beams, and how beams tell shadow."""
+    shares = shadowing.filter(regex="^(rs|unreached)_").columns
+    by = shadowing.set_index(["design", "n_beams"])[shares]
+    logarithm = np.log(by.loc["diamond"].index.to_numpy(float))
+    r2 = {name: np.corrcoef(logarithm, by.loc["diamond", name])[0, 1] ** 2 for name in shares}
+    return {
+        "survey_five_scans": (by.loc["single"] - by.loc["diamond"]).reset_index(),
+        "survey_log_beams": pd.DataFrame([{"design": "diamond", **r2}]),
+    }
 
 
 def agreement_with_truth(folder: Path) -> pd.DataFrame:
