@@ -46,6 +46,9 @@ def survey(folder: Path) -> dict[str, pd.DataFrame]:
         wide = means.mean(numeric_only=True).unstack("stand")
         wide.columns = ["_".join(names) for names in wide.columns]
         found[f"survey_{name}"] = wide.reset_index()
+    variants = pd.read_csv(folder / "survey" / "variants.csv")
+    first = ["design", "n_beams", "stand", "variant"]
+    found["survey_variants"] = variants[[*first, *variants.columns.difference(first, sort=False)]]
     return found | of_five_scans(found["survey_shadowing"])
 
 
