@@ -55,7 +55,7 @@ def setup(settings: Settings) -> Setup:
         voxels=settings.voxels.model_dump(exclude={"sizes_m"}),
         leaves=settings.leaves.model_dump(),
         sensors=settings.sensors.grid(),
-        site=settings.site.model_dump(exclude={"timezone"}),
+        site=settings.site.model_dump(exclude={"timezone", "crs"}),
         time=dict(settings.time) | {"step_min": 15.0},
         radiation={"linke_turbidity": settings.radiation.linke_turbidity},
         atmosphere={"model": settings.radiation.sky},

@@ -97,7 +97,7 @@ class Run:
         """Sun and sky, by default at the times of the run."""
         times = self.times if times is None else times
         columns = self.settings.radiation.broadband() | {"kind": kind}
-        site = Site(**self.settings.site.model_dump(exclude={"timezone"}))
+        site = Site(**self.settings.site.model_dump(exclude={"timezone", "crs"}))
         path = Path(self.settings.data_dir) / self.settings.radiation.path
         radiation = broadband(times, site, path=path, **columns).values
         return scaled(sky_dataset(times, site, radiation, model=model), gain)
