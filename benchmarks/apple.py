@@ -120,7 +120,7 @@ def compare(run: Run, n_placements: int) -> tuple[pd.DataFrame, pd.DataFrame]:
     index = np.searchsorted(fine, table.columns)
     drawn, rows, grids = halves(list(run.sensors["sensor"])), [], {}
     for name, (on_shoot, reach_m) in LEAVES.items():
-        placing = run.settings.leaves.model_dump(exclude={"placements"})
+        placing = run.settings.leaves.model_dump(exclude={"placements", "path"})
         placing |= {"leaves_per_shoot": on_shoot, "max_distance_m": reach_m}
         grids[name] = traced_grid(run, placing, n_placements, fine)
         for sway_m, minute in itertools.product(SWAY_M, (False, True)):

@@ -76,7 +76,9 @@ def with_diffuse_share_of(sky, other):
 
 def clumped(run: Run) -> list[traced.TracedScene]:
     """As many leaves with as much area, 128 on a shoot."""
-    placing = run.settings.leaves.model_dump(exclude={"placements"}) | {"leaves_per_shoot": 128}
+    placing = run.settings.leaves.model_dump(exclude={"placements", "path"}) | {
+        "leaves_per_shoot": 128
+    }
     scenes = []
     for number in range(run.settings.leaves.placements):
         leaves = along_wood(run.wood, **placing, seed=stream_seed(7, number))

@@ -53,7 +53,7 @@ def setup(settings: Settings) -> Setup:
         polygons=settings.polygons.model_dump() | {"voxel_size_m": settings.polygons.nominal_m},
         surfels=settings.surfels.model_dump() | {"max_deviation": settings.clean.max_deviation},
         voxels=settings.voxels.model_dump(exclude={"sizes_m"}),
-        leaves=settings.leaves.model_dump(),
+        leaves=settings.leaves.model_dump(exclude={"path"}),
         sensors=settings.sensors.grid(),
         site=settings.site.model_dump(exclude={"timezone", "crs"}),
         time=dict(settings.time) | {"step_min": 15.0},
