@@ -151,12 +151,31 @@ WORSE = {
 
 
 def scaling(folder: Path) -> dict[str, pd.DataFrame]:
-    """Processor time at the largest number of triangles over that at the smallest."""
+    """Triangles: processor time at the most over that at the fewest. Every axis: its largest case,
+    and exponents of growth over its three largest, of time as a whole and of memory.
+    """
     table = pd.read_csv(DATA / "scaling.csv")
-    own = table[table["axis"] == "triangles"].sort_values("value")
-    parts = ("direct", "paths")
+    steps = [column for column in table if column.endswith("_cpu_s")]
+    table["cpu_s"] = table[steps].sum(axis=1)
+    axes = {str(name): part.sort_values("value") for name, part in table.groupby("axis")}
+    own, parts = axes["triangles"], ("direct", "paths")
     ratio = [own[f"{part}_cpu_s"].iloc[-1] / own[f"{part}_cpu_s"].iloc[0] for part in parts]
-    return {"scaling_growth": pd.DataFrame({"part": list(parts), "times_as_long": ratio})}
+    largest = pd.DataFrame(
+        [
+            {"axis": axis, "value": part["value"].iloc[-1], "cpu_s": part["cpu_s"].iloc[-1]}
+            | {"peak_mb": (part["engine_mb"] + part["geometry_mb"]).iloc[-1]}
+            | {f"{of}_exponent": exponent(part, of) for of in ("cpu_s", "engine_mb")}
+            for axis, part in axes.items()
+        ]
+    )
+    growth = pd.DataFrame({"part": list(parts), "times_as_long": ratio})
+    return {"scaling_growth": growth, "scaling_exponents": largest}
+
+
+def exponent(part: pd.DataFrame, of: str) -> float:
+    """Slope of the logarithm against that of the size, over the three largest sizes."""
+    last = np.log(part[["value", of]].iloc[-3:].to_numpy(float))
+    return float(np.polyfit(last[:, 0], last[:, 1], 1)[0])
 
 
 REAL_RUNS = ("apple", "leafy-tree", "single-scan", "pine-plot")

@@ -1,4 +1,4 @@
-"""How time and memory grow with triangles, sensors and timesteps.
+"""How time and memory grow with triangles, sensors, timesteps, both of these, days and trees.
 
     PYTHONPATH=scripts python benchmarks/scaling.py OUTPUT [--largest N]
 
@@ -35,11 +35,23 @@ AXES = {
     "triangles": (10_000, 31_623, 100_000, 316_228, 1_000_000, 3_162_278, 10_000_000),
     "sensors": (10, 32, 100, 316, 1000, 3162, 10_000),
     "times": (10, 32, 100, 316, 1000, 3162, 10_000),
+    "pairs": (1000, 10_000, 100_000, 1_000_000, 10_000_000),
+    "days": (4, 12, 37, 116, 365),
     "trees": (1, 10, 100, 400),
 }
+"""Pairs are of a sensor and a time; days have a time every ten minutes of their light."""
+TIMES_A_DAY = 72
 SPACING_M = 5.0
 """Of the trees of a stand: 400 stand on a hectare."""
 STEPS = ("build", "direct", "paths", "bands")
+
+
+def case(axis: str, value: int) -> dict[str, int]:
+    """How many triangles, sensors, times and trees a point has."""
+    if axis == "pairs":  # ten sensors for a time, as 10,000 sensors at 1000 times
+        sensors = round(np.sqrt(10 * value))
+        return BASE | {"sensors": sensors, "times": round(value / sensors)}
+    return BASE | ({"times": TIMES_A_DAY * value} if axis == "days" else {axis: value})
 
 
 def memory_mb(field: str) -> float:
@@ -150,10 +162,9 @@ def main() -> None:
     rows = []
     for name in options.axes:
         for value in AXES[name]:
-            case = BASE | {name: value}
-            if case["triangles"] > options.largest:
+            if (asked := case(name, value))["triangles"] > options.largest:
                 continue
-            command = [sys.executable, __file__, "--point", json.dumps(case)]
+            command = [sys.executable, __file__, "--point", json.dumps(asked)]
             command += ["--variant", options.variant]
             done = subprocess.run(command, check=True, capture_output=True, text=True)
             rows.append({"axis": name, "value": value} | json.loads(done.stdout.splitlines()[-1]))
