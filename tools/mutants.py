@@ -1,12 +1,13 @@
 """Do tests notice? Small faults are put into the code, one at a time, and its tests are run.
 
-    PYTHONPATH=scripts .venv/bin/python tools/mutants.py [--count 60] [--seed 1] [--packages …]
+    PYTHONPATH=scripts .venv/bin/python tools/mutants.py [--count 100] [--seed 1] [--packages …]
 
 A fault swaps an operator, turns a comparison round, or changes a number or a truth value. Faults
 are drawn over all places of the packages where one is possible; left out are messages, annotations
 and decorators. The tests of a fault are those of tests/unit and tests/physics that import its
-module, or else a module that imports it; they have to pass without it. Prints every fault that they
-let pass.
+module, then those that import a module that imports it, the quickest first and no slow ones. Each
+is run once without a fault before it is used: one that fails then tells nothing, and ends the run.
+Writes every fault to `--output`; `why` of a row that stands there already is kept.
 """
 
 import argparse
@@ -18,12 +19,14 @@ import os
 import re
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas  # noqa: F401  what every test imports, once for all
+import pandas as pd
 import pytest
 
 ROOT = Path(__file__).parents[1]
@@ -35,7 +38,8 @@ SWAPS: dict[type[ast.AST], type[ast.AST]] = {
     ast.In: ast.NotIn, ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.And: ast.Or, ast.Or: ast.And,
 }  # fmt: skip
 MESSAGE = re.compile(r"raise |log\.|\w*Error\(|warnings\.")
-LIMIT_S, MOST_FILES = 300, 6  # for the tests of one fault; the shortest files are taken
+FAULT = ["module", "line", "fault"]
+BUDGET_S, SLOW_S = 60, 40  # for the tests of one fault, as long as they took without it; for a file
 
 
 def places(node: ast.AST, line: Any = None) -> Iterator[tuple]:
@@ -66,19 +70,38 @@ def put(owner: ast.AST, name: str, k: int | None, new: ast.AST) -> ast.AST:
     return old
 
 
-def tests_of(module: str) -> list[str]:
-    """Test files that import a module, or else a module that does."""
+def importing(module: str, paths: Iterator[Path]) -> list[Path]:
+    """Those files that import a module by name."""
     package, _, name = module.rpartition(".")
     imports = re.compile(
         rf"^\s*(from {package} import [^\n]*\b{name}\b|(from|import) {module}\b)", re.MULTILINE
     )
-    tests = (*ROOT.glob("tests/unit/test_*.py"), *ROOT.glob("tests/physics/test_*.py"))
-    found = [path for path in tests if imports.search(path.read_text())]
-    if found:
-        return [str(path) for path in sorted(found, key=lambda path: path.stat().st_size)]
-    users = [path for path in SCRIPTS.rglob("*.py") if imports.search(path.read_text())]
+    return [path for path in paths if imports.search(path.read_text())]
+
+
+@cache
+def tests_of(module: str) -> tuple[list[Path], list[Path]]:
+    """Test files that import a module, and those that import a module that does."""
+
+    def tests(name: str) -> set[Path]:
+        return {p for part in ("unit", "physics") for p in importing(name, tests_in(part))}
+
+    def tests_in(part: str) -> Iterator[Path]:
+        return ROOT.glob(f"tests/{part}/test_*.py")
+
+    own = tests(module)
+    users = importing(module, SCRIPTS.rglob("*.py"))
     names = {".".join(path.relative_to(SCRIPTS).with_suffix("").parts) for path in users}
-    return sorted({test for user in names for test in tests_of(user)})
+    return sorted(own), sorted(set().union(*map(tests, names)) - own)
+
+
+@cache
+def without_fault_s(test: Path) -> float:
+    """Seconds that a test file takes as the code stands; without end if it is slow."""
+    begin = time.perf_counter()
+    if code := exit_code((test,), None, SLOW_S):
+        sys.exit(f"{test.relative_to(ROOT)} ends with {code} without any fault: mend it first")
+    return np.inf if code is None else time.perf_counter() - begin
 
 
 class Tree(importlib.abc.MetaPathFinder, importlib.abc.Loader):
@@ -96,49 +119,79 @@ class Tree(importlib.abc.MetaPathFinder, importlib.abc.Loader):
         exec(compile(self.tree, self.path, "exec"), module.__dict__)
 
 
-def run(tests: list[str], tree: Tree) -> None:
-    """Run tests with the module's other tree; the exit code says whether they pass."""
-    sys.meta_path.insert(0, tree)
-    with tempfile.TemporaryDirectory() as cache:
-        os.environ["NUMBA_CACHE_DIR"] = cache  # code that was compiled before knows of no fault
+def run(tests: tuple[Path, ...], tree: Tree | None) -> None:
+    """Run tests, with another tree of one module if told; the exit code says whether they pass."""
+    with tempfile.TemporaryDirectory() as folder:
+        if tree:
+            sys.meta_path.insert(0, tree)
+            if "njit" in tree.path.read_text():  # what was compiled before knows of no fault
+                os.environ["NUMBA_CACHE_DIR"] = folder
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        sys.exit(int(pytest.main(["-x", "-q", "-n", "0", "-p", "no:cacheprovider", *tests])))
+        options = ["-x", "-q", "-n", "0", "-p", "no:cacheprovider", f"--basetemp={folder}/tests"]
+        sys.exit(int(pytest.main([*options, *map(str, tests)])))
 
 
-def noticed(tests: list[str], tree: Tree) -> bool:
-    """Whether tests fail, or find no end, in a child of this process."""
+def exit_code(tests: tuple[Path, ...], tree: Tree | None, limit_s: float) -> int | None:
+    """How tests end in a child of this process; None if they find no end."""
     child = multiprocessing.get_context("fork").Process(target=run, args=(tests, tree))
     child.start()
-    child.join(LIMIT_S)
+    child.join(limit_s)
+    alive = child.is_alive()
     child.kill()
     child.join()
-    return child.exitcode != 0
+    return None if alive else child.exitcode
+
+
+def noticed(module: str, tree: Tree) -> bool:
+    """Whether a test of a module fails, or finds no end."""
+    left_s = float(BUDGET_S)
+    for some in tests_of(module):
+        taken = []
+        for test in sorted(some, key=without_fault_s):
+            if without_fault_s(test) > left_s:
+                break
+            taken.append(test)
+            left_s -= without_fault_s(test)
+        limit_s = 120 + 5 * sum(map(without_fault_s, taken))
+        if taken and exit_code(tuple(taken), tree, limit_s) != 0:
+            return True
+    return False
 
 
 def main() -> None:
     """Draw faults, run tests, tell."""
     options = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    options.add_argument("--count", type=int, default=60)
+    options.add_argument("--count", type=int, default=100)
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--packages", nargs="+", default=PACKAGES)
+    options.add_argument("--output", type=Path, default=ROOT / "docs" / "data" / "mutants.csv")
     asked = options.parse_args()
     files = [path for one in asked.packages for path in (SCRIPTS / "dapple" / one).rglob("*.py")]
     trees = {path: ast.parse(path.read_text()) for path in sorted(files)}
     everywhere = [(path, *place) for path, tree in trees.items() for place in places(tree)]
     drawn = np.random.default_rng(asked.seed).permutation(len(everywhere))[: asked.count]
-    died = 0
-    for number in sorted(drawn):
+    known = reasons(asked.output) if asked.output.exists() else pd.Series(dtype=object)
+    rows = []
+    for number in drawn:
         path, owner, name, k, new, line = everywhere[number]
         module = ".".join(path.relative_to(SCRIPTS).with_suffix("").parts)
         before = ast.unparse(line).splitlines()[0]
         old = put(owner, name, k, new)
-        tests = tests_of(module)[:MOST_FILES]
-        found = bool(tests) and noticed(tests, Tree(module, path, trees[path]))
-        died += found
-        told = f"{module}:{line.lineno} {before} -> {ast.unparse(line).splitlines()[0]}"
-        print(f"{'noticed' if found else 'PASSED '} {told}", flush=True)
+        found = noticed(module, Tree(module, path, trees[path]))
+        after = ast.unparse(line).splitlines()[0]
         put(owner, name, k, old)
-    print(f"{died} of {len(drawn)} noticed, of {len(everywhere)} places where a fault is possible")
+        why = "" if found else known.get((module, before, after), "")
+        rows.append(dict(zip(FAULT, (module, before, after), strict=True), noticed=found, why=why))
+        print(f"{'noticed' if found else 'PASSED '} {module}: {before} -> {after}", flush=True)
+    pd.DataFrame(rows).to_csv(asked.output, index=False)
+    died = sum(row["noticed"] for row in rows)
+    print(f"{died} of {len(rows)} noticed, of {len(everywhere)} places where a fault is possible")
+
+
+def reasons(path: Path) -> pd.Series:
+    """Why no test notices a fault, as a person wrote it into an earlier table, by fault."""
+    table = pd.read_csv(path, keep_default_na=False).drop_duplicates(FAULT)
+    return table.set_index(FAULT)["why"]
 
 
 if __name__ == "__main__":
