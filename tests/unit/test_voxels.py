@@ -423,6 +423,19 @@ def test_returns_are_what_the_classified_cloud_is_where_they_lie():
     assert kinds(shots).tolist() == [0, 1, 2, 2]
 
 
+def test_an_echo_that_was_filtered_out_counts_beside_the_plant_as_the_plant_and_far_away_as_noise():
+    leaf, wood = [0.52, 0.01, 0.01], [1.52, 0.01, 0.01]
+    points = np.array([leaf, wood, wood])
+    beside = [[0.54, 0.06, -0.04], [0.46, 0.01, 0.01], [1.56, 0.06, 0.06]]
+    far = [[0.61, 0.01, 0.01], [0.52, 0.11, 0.01], [1.0, 0.0, 0.0], [9.0, 9.0, 9.0]]
+    echoes = np.array(beside + far)
+    ranges_m = np.linalg.norm(echoes, axis=1)
+    shots = shots_of([0.0, 0.0, 0.0], echoes / ranges_m[:, None], [[r] for r in ranges_m])
+    told = {"points_m": points, "classes": np.array([4, 0, 0]), "voxel_size_m": 0.05}
+    assert kinds_by_place(**told)(shots).tolist() == [0, 0, 1, 2, 2, 2, 2]
+    assert kinds_by_place(**told, beside=False)(shots).tolist() == [2] * 7
+
+
 @pytest.mark.parametrize(
     ("ranges", "kinds", "found"),
     [

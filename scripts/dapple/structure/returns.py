@@ -12,14 +12,19 @@ from dapple.structure.traversal import HIT, NOISE, WOOD
 Kinds = Callable[[Shots], np.ndarray] | np.ndarray | None
 """A function of a chunk, an array for the returns of all chunks, or None: all are leaf hits."""
 
+BESIDE = np.array([step for step in np.ndindex(3, 3, 3) if step != (1, 1, 1)]) - 1
+"""From a voxel to the 26 around it."""
+
 
 def kinds_by_place(
-    points_m: np.ndarray, classes: np.ndarray, *, voxel_size_m: float
+    points_m: np.ndarray, classes: np.ndarray, *, voxel_size_m: float, beside: bool = True
 ) -> Callable[[Shots], np.ndarray]:
     """Kinds of returns from a classified cloud that was filtered and thinned.
 
-    A return is what most points of the cloud in its voxel are; where the cloud has none (they were
-    filtered out) it is noise.
+    A return is what most points of the cloud in its voxel are. Where the cloud has none, the return
+    was filtered out: weak and mixed echoes, which a leaf's edge gives. Beside the plant such an
+    echo still tells that the beam met something, so it is what most points in the 26 voxels around
+    it are. Farther away it is noise.
 
     Parameters
     ----------
@@ -29,6 +34,8 @@ def kinds_by_place(
         4 leaf, everything else wood. Where both are equal, leaf.
     voxel_size_m : float
         Edge of the voxels, as in the majority vote of the classification.
+    beside : bool
+        False: what was filtered out is noise beside the plant, too.
 
     Returns
     -------
@@ -51,14 +58,25 @@ def kinds_by_place(
         found, inverse = np.unique(own, return_inverse=True)
         voxels.append(found)
         votes.append(np.bincount(inverse, np.where(classes[slab] == 4, 1.0, -1.0)))
-    known, leaf = np.concatenate(voxels), np.concatenate(votes) >= 0
+    known, leaf_votes = np.concatenate(voxels), np.concatenate(votes)
 
-    def kinds(chunk: Shots) -> np.ndarray:
-        at = np.floor(chunk.return_xyz_m / voxel_size_m).astype(np.int64)
+    def ballot(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Whether the cloud has points in voxels, and votes for leaf less those for wood."""
         inside = ((at >= low) & (at <= high)).all(axis=1)
         place = np.minimum(np.searchsorted(known, key(at)), len(known) - 1)
         found = inside & (known[place] == key(at))
-        return np.where(found, np.where(leaf[place], HIT, WOOD), NOISE).astype(np.uint8)
+        return found, np.where(found, leaf_votes[place], 0.0)
+
+    def kinds(chunk: Shots) -> np.ndarray:
+        at = np.floor(chunk.return_xyz_m / voxel_size_m).astype(np.int64)
+        found, balance = ballot(at)
+        if beside:
+            alone = np.flatnonzero(~found & ((at >= low - 1) & (at <= high + 1)).all(axis=1))
+            for offset in BESIDE:
+                near, votes = ballot(at[alone] + offset)
+                found[alone] |= near
+                balance[alone] += votes
+        return np.where(found, np.where(balance >= 0, HIT, WOOD), NOISE).astype(np.uint8)
 
     return kinds
 
