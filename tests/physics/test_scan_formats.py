@@ -4,9 +4,12 @@ import numpy as np
 import pye57
 import pytest
 
+from dapple import steps
 from dapple.cloud import shot_sources
+from dapple.cloud.clean import clean
 from dapple.config.settings import Settings
-from dapple.formats import clouds, shots
+from dapple.formats import clouds, ground_surface, shots
+from dapple.formats.clouds import LEAF, WOOD
 from dapple.structure.stem import stem_position
 from dapple.structure.voxel_sums import Grid
 from dapple.structure.voxels import plant_area_density
@@ -107,3 +110,25 @@ def test_a_file_that_keeps_every_shot_gives_the_plant_area_of_the_scan(
     expected = plant_area_m2(scan, grid)
     assert expected > 3.0
     assert plant_area_m2(read, grid) == pytest.approx(expected, rel=tolerance)
+
+
+def test_plant_area_hardly_depends_on_whether_weak_echoes_can_be_filtered(scan):
+    """A file without reflectance keeps every echo; with it, echoes of leaves' edges are left out."""
+    kept = scan.truth != 7
+    echoes = {"Reflectance": scan.reflectance_db, "Deviation": scan.deviation}
+    classes = np.where(scan.truth == LEAF, LEAF, WOOD).astype(np.uint8)
+    area_m2, n_points = {}, {}
+    for name, known in (("plain", {}), ("filtered", echoes)):
+        attributes = {key: values[kept] for key, values in known.items()}
+        attributes["Classification"] = classes[kept]
+        cloud = clouds.Cloud(scan.return_xyz_m[kept], np.zeros(3), attributes)
+        settings = Settings().clean.model_dump(exclude={"distance_points"})
+        cloud, _ = clean(
+            cloud, where="scan", ground=ground_surface.flat(0.0),
+            pdal=Settings().tools.pdal, cloudcompare=Settings().tools.cloudcompare, **settings,
+        )  # fmt: skip
+        kinds = steps.return_kinds(cloud, Settings().classify.majority_voxel_m)
+        density = steps.voxels(scan, cloud, 0.2, kinds=kinds)["plant_area_density_m2_m3"]
+        area_m2[name], n_points[name] = float(density.sum()) * 0.2**3, len(cloud)
+    assert n_points["filtered"] < 0.95 * n_points["plain"]
+    assert area_m2["filtered"] == pytest.approx(area_m2["plain"], rel=0.02)
