@@ -113,7 +113,7 @@ def test_a_file_that_keeps_every_shot_gives_the_plant_area_of_the_scan(
 
 
 def test_plant_area_hardly_depends_on_whether_weak_echoes_can_be_filtered(scan):
-    """A file without reflectance keeps every echo; with it, echoes of leaves' edges are left out."""
+    """A file without reflectance keeps every echo; with it, weak ones are left out."""
     kept = scan.truth != 7
     echoes = {"Reflectance": scan.reflectance_db, "Deviation": scan.deviation}
     classes = np.where(scan.truth == LEAF, LEAF, WOOD).astype(np.uint8)
