@@ -35,9 +35,7 @@ def seen_from(
         One point is left in a voxel of this size [m].
     """
     kinds = classified.attributes["Classification"]
-    kinds_of = kinds_by_place(
-        classified.xyz_m, kinds, voxel_size_m=majority_voxel_m, beside=False
-    )
+    kinds_of = kinds_by_place(classified.xyz_m, kinds, voxel_size_m=majority_voxel_m, beside=False)
     parts, classes = [], []
     for chunk in chunks:
         kind = kinds_of(chunk)
