@@ -63,6 +63,15 @@ def test_more_chlorophyll_means_a_darker_leaf():
     assert dark.mean() < 0.8 * pale.mean()
 
 
+@pytest.mark.parametrize("pigment", ["chlorophyll", "carotenoids", "anthocyanin"])
+def test_a_leaf_may_lack_a_pigment_and_then_absorbs_less(pigment):
+    without, with_it = (
+        sum(leaf_spectra(BANDS, **{f"{pigment}_ug_cm2": content})) for content in (0.0, 20.0)
+    )
+    assert (without >= with_it - 1e-12).all()
+    assert (without > with_it + 0.05).any()
+
+
 def test_a_leaf_outside_the_range_of_prospect_is_refused():
     with pytest.raises(InputError, match=r"water_cm: found 12\.0; expected 0\.0 to 0\.1"):
         leaf_spectra(BANDS, water_cm=12.0)

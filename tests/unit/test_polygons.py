@@ -110,6 +110,17 @@ def test_hexagons_are_turned_to_all_sides_alike():
     assert np.abs(spoke[:, 2]).mean() / (0.05 / 6) == pytest.approx(0.5, abs=0.015)
 
 
+@pytest.mark.parametrize("along", [0, 1, 2])
+def test_a_strip_keeps_its_area_whichever_axis_it_lies_along(along):
+    """4 by 1 cm, thinner than the noise across: its plane is that of its two longer edges."""
+    u, v = np.meshgrid([0.004, 0.024, 0.044], [0.01, 0.02], indexing="ij")
+    strip = np.full((6, 3), 0.02)
+    strip[:, along], strip[:, (along + 1) % 3] = u.ravel(), v.ravel()
+    mesh = reconstruct(strip, buffer_m=0.0, seed=1)
+    assert mesh.area_m2 == pytest.approx(0.04 * 0.01, rel=1e-9)
+    assert abs(mesh.element_normal[0, (along + 2) % 3]) == pytest.approx(1.0)
+
+
 def test_points_on_a_line_give_a_rectangle_as_wide_as_the_buffer_asks():
     line = np.array([[0.01, 0.02, 0.02]]) + np.arange(4)[:, None] * [0.006, 0.004, 0.0]
     mesh = reconstruct(line, buffer_m=0.003, seed=1)

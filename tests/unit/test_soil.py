@@ -51,6 +51,11 @@ def test_the_near_infrared_band_is_found_wherever_it_stands():
         _ = camera([("b", 550.0, 20.0)]).near_infrared
 
 
+def test_of_five_bands_traced_by_threes_the_infrared_ones_are_in_the_second_three():
+    """450, 560 and 650 nm are not scattered by leaves; 730 and 840 nm are."""
+    assert [ZHAO.is_infrared(first) for first in (0, 3)] == [False, True]
+
+
 def test_a_spectrum_is_linear_between_its_points_and_even_beyond_them():
     seen = camera([(str(nm), nm, 10.0) for nm in (400.0, 500.0, 525.0, 600.0, 900.0)])
     found = seen.at_centres(((500.0, 0.2), (550.0, 0.4), (600.0, 0.1)))
