@@ -22,8 +22,8 @@ N_SENSORS, N_TIMES = 6, 6
 LEAF_AREA_M2 = {
     "polygons": 1.77,
     "surfels": 5.49,
-    "voxels_0.2": 3.85,
-    "voxels_1.0": 3.11,
+    "voxels_0.2": 4.25,
+    "voxels_1.0": 3.46,
     "truth": 5.0,
 }
 RMSE_UMOL_M2_S = {
