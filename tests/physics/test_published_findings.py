@@ -74,11 +74,11 @@ def agreement(world: Chain, conditions: Conditions) -> dict[str, dict[str, float
 
 
 def test_the_published_order_and_the_published_paradox(world):
-    found = agreement(world, Conditions(angular_step_deg=0.11))
+    found = agreement(world, Conditions(angular_step_deg=0.09))
     r = [found[name]["r"] for name in RECONSTRUCTIONS]
     assert r[0] > r[1] > r[2]
     polygons, voxels = found["polygons"], found["voxels_0.2"]
-    assert polygons["leaf_area_m2"] > 0.9 * voxels["leaf_area_m2"]  # published: more
+    assert polygons["leaf_area_m2"] > voxels["leaf_area_m2"]
     assert polygons["mean_par_rel"] > voxels["mean_par_rel"]
 
 
