@@ -270,8 +270,6 @@ def _cams(path: Path, lines: Sequence[str]) -> Table | None:
 
 def _length_min(start: pd.Series, end: pd.Series) -> float | None:
     """Length of the first interval [min]."""
-    if not len(start):
-        return None
     first, last = pd.to_datetime([start.iloc[0], end.iloc[0]], errors="coerce", utc=True)
     # A period that ends with its last second or minute lasts until the next one begins.
     minutes = (last - first).total_seconds() / 60.0

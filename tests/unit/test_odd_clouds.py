@@ -1,0 +1,162 @@
+"""Point clouds with odd or damaged parts: what can be read is, the rest is told or refused."""
+
+import struct
+
+import laspy
+import numpy as np
+import pyproj
+import pytest
+from tests.unit.test_cloud_readers import XYZ, described, las, ply_text
+
+from dapple.errors import InputError
+from dapple.formats import cloud_crs, clouds
+
+AXES = [f"property float {axis}" for axis in "xyz"]
+
+
+def test_bytes_that_are_told_to_be_undocumented_are_stepped_over(tmp_path):
+    values = np.zeros(400, [("unknown", "u1", 3), ("score", "<f4")])
+    values["unknown"], values["score"] = 255, 2.5
+    records = [described("reserved", 0, options=3) + described("score", 9)]
+    cloud = clouds.read(las(tmp_path / "a.las", extra=values.tobytes(), records=records))
+    assert set(cloud.attributes) == {"score"}
+    assert set(cloud.attributes["score"]) == {2.5}
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"), [(77, "unknown type (77)"), (10, "more extra bytes than a point has")]
+)
+def test_a_description_that_cannot_be_is_told_and_the_points_are_read(tmp_path, kind, said):
+    cloud, source = clouds.read_with_source(
+        las(tmp_path / "a.las", extra=bytes(4 * 400), records=[described("odd", kind)])
+    )
+    assert cloud.xyz_m == pytest.approx(XYZ, abs=1e-9)
+    assert not cloud.attributes
+    assert said in " ".join(source.notes)
+
+
+def test_an_offset_of_extra_bytes_is_added_and_a_scale_of_nothing_is_none(tmp_path):
+    shifted = bytearray(described("Reflectance", 4, options=8 | 16, scale=0.5))
+    shifted[136:144] = struct.pack("<d", -20.0)
+    raw = np.full(400, 6, "<i2").tobytes()
+    found = clouds.read(las(tmp_path / "a.las", extra=raw, records=[bytes(shifted)]))
+    assert set(found.attributes["Reflectance"]) == {-17.0}
+    scaled = described("Reflectance", 4, options=8, scale=0.0)
+    found = clouds.read(las(tmp_path / "b.las", extra=raw, records=[scaled]))
+    assert set(found.attributes["Reflectance"]) == {6}
+
+
+def laz(path):
+    clouds.write(path, clouds.Cloud(XYZ))
+    return bytearray(path.read_bytes())
+
+
+def test_compressed_points_without_the_word_how_are_refused(tmp_path):
+    raw = laz(tmp_path / "a.laz")
+    at = raw.index(b"laszip encoded")
+    raw[at : at + 14] = b"something else"
+    (tmp_path / "a.laz").write_bytes(raw)
+    with pytest.raises(InputError, match="without the record that says how"):
+        clouds.read(tmp_path / "a.laz")
+
+
+@pytest.mark.parametrize("n_items", [1, 60_000])
+def test_compressed_items_of_another_size_than_a_point_are_refused(tmp_path, n_items):
+    raw = laz(tmp_path / "a.laz")
+    record = raw.index(b"laszip encoded") - 2 + 54
+    struct.pack_into("<H", raw, record + 32, n_items)
+    struct.pack_into("<H", raw, record + 36, 7)
+    (tmp_path / "a.laz").write_bytes(raw)
+    with pytest.raises(InputError, match=r"compressed items of .* Export the file again"):
+        clouds.read(tmp_path / "a.laz")
+
+
+def test_a_laz_whose_table_of_chunks_is_told_at_its_end_is_read(tmp_path):
+    """As a program leaves it that could not go back to the beginning."""
+    raw = laz(tmp_path / "a.laz")
+    data_at = struct.unpack_from("<I", raw, 96)[0]
+    table_at = raw[data_at : data_at + 8]
+    raw[data_at : data_at + 8] = struct.pack("<q", -1)
+    (tmp_path / "a.laz").write_bytes(raw + table_at)
+    assert clouds.read(tmp_path / "a.laz").xyz_m == pytest.approx(XYZ, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("ply\nelement vertex 1\nend_header\n", "no format"),
+        (ply_text(["property float x", "property colour y"], ""), "property colour y"),
+        (ply_text([*AXES, "property float x"], ""), "element vertex with 2 rows"),
+        (ply_text(AXES[:2], "1 2\n3 4\n"), "no vertices with x, y and z"),
+        (ply_text(AXES, "", "element camera 9\nproperty float v"), "an end within"),
+        (ply_text([*AXES, "property list uchar int v"], "1 2 3 0\n4 5 6\n"), "row 2 of vertex"),
+    ],
+)
+def test_a_ply_that_is_damaged_names_what_is(tmp_path, text, said):
+    (tmp_path / "a.ply").write_text(text)
+    with pytest.raises(InputError, match=said):
+        clouds.read(tmp_path / "a.ply")
+
+
+def test_an_origin_that_is_no_place_is_none(tmp_path):
+    text = ply_text(AXES, "1 2 3\n4 5 6\n", "comment origin_m 7 nan 9")
+    (tmp_path / "a.ply").write_text(text)
+    assert clouds.read(tmp_path / "a.ply").xyz_m.tolist() == [[1, 2, 3], [4, 5, 6]]
+
+
+@pytest.mark.parametrize("listed", [False, True])
+def test_binary_elements_before_the_vertices_are_passed_over(tmp_path, listed):
+    own = "property list uchar short v" if listed else "property short v"
+    head = ["ply", "format binary_little_endian 1.0", "element edge 2", own, "element vertex 2"]
+    body = struct.pack("<BhBhh", 1, 7, 2, 8, 9) if listed else struct.pack("<2h", 7, 8)
+    rows = np.array([[1, 2, 3], [4, 5, 6]], "<f4").tobytes()
+    (tmp_path / "a.ply").write_bytes(
+        "\n".join([*head, *AXES, "end_header", ""]).encode() + body + rows
+    )
+    assert clouds.read(tmp_path / "a.ply").xyz_m.tolist() == [[1, 2, 3], [4, 5, 6]]
+
+
+def keys(*pairs):
+    """A record of GeoTIFF keys that hold numbers themselves."""
+    words = [1, 1, 0, len(pairs)]
+    for key, value in pairs:
+        words += [key, 0, 1, value]
+    return {(cloud_crs.USER, cloud_crs.GEO_KEYS): [struct.pack(f"<{len(words)}H", *words)]}
+
+
+def test_a_system_may_be_told_by_numbers_and_its_heights_by_another():
+    assert cloud_crs.of_records(keys((3072, 25832))).to_epsg() == 25832
+    both = cloud_crs.of_records(keys((3072, 25832), (4096, 7837)))
+    assert [one.to_epsg() for one in both.sub_crs_list] == [25832, 7837]
+    # Heights that nobody knows leave the system as it is.
+    assert cloud_crs.of_records(keys((3072, 25832), (4096, 31999))).to_epsg() == 25832
+    assert cloud_crs.of_records(keys((1024, 1))) is None
+
+
+def test_units_may_be_told_without_a_system():
+    name, units, notes = cloud_crs.describe(keys((3076, 9002)))
+    assert (name, notes) == ("", ())
+    assert units.horizontal_m == units.vertical_m == pytest.approx(0.3048)
+
+
+def test_a_broken_system_is_a_note_for_points_and_an_error_for_crowns(tmp_path):
+    broken = {(cloud_crs.USER, cloud_crs.WKT): [b"PROJCS[nothing"]}
+    name, units, notes = cloud_crs.describe(broken)
+    assert name == ""
+    assert units.horizontal_m == 1.0
+    assert "cannot be read" in notes[0]
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.add_crs(pyproj.CRS("EPSG:25832"))
+    cloud = laspy.LasData(header)
+    cloud.x, cloud.y, cloud.z = XYZ.T
+    cloud.write(tmp_path / "a.las")
+    raw = (tmp_path / "a.las").read_bytes()
+    (tmp_path / "a.las").write_bytes(
+        raw.replace(b"PROJCRS", b"XXXXCRS").replace(b"PROJCS", b"XXXXCS")
+    )
+    with pytest.raises(InputError, match=r"(?s)cannot be read .*a_srs"):
+        cloud_crs.horizontal(tmp_path / "a.las", "")
+    with pytest.raises(InputError, match="Check the path in the configuration"):
+        cloud_crs.horizontal(tmp_path / "none.las", "")
+    with pytest.raises(InputError, match="as in EPSG:25832"):
+        cloud_crs.horizontal(las(tmp_path / "b.las"), "EPSG:0")
