@@ -43,7 +43,7 @@ SWAPS: dict[type[ast.AST], type[ast.AST]] = {
 MESSAGE = re.compile(r"raise |log\.|\w*Error\(|warnings\.")
 FAULT = ["module", "line", "fault"]
 # Seconds of a processor for the tests of one fault, as they took without it, and for one file.
-BUDGET_S, SLOW_S = 45, 25
+BUDGET_S, SLOW_S = 30, 15
 WAIT = 4  # seconds of the clock that a test may take for one of a processor
 AHEAD = ("scipy.optimize", "xarray", "pyarrow.parquet", "matplotlib.figure")
 
@@ -138,7 +138,8 @@ def run(tests: tuple[Path, ...], tree: Tree | None) -> None:
         if tree:
             sys.meta_path.insert(0, tree)
             if "njit" in tree.path.read_text():  # what was compiled before knows of no fault
-                numba.config.CACHE_DIR = folder
+                os.environ["NUMBA_CACHE_DIR"] = folder
+                numba.config.reload_config()
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         options = ["-x", "-q", "-n", "0", "-p", "no:cacheprovider", f"--basetemp={folder}/tests"]
         sys.exit(int(pytest.main([*options, *map(str, tests)])))
