@@ -10,7 +10,7 @@ import pytest
 from dapple.config.settings import validate
 from dapple.estimate import beginning, forecast, planned, speed, telling
 from dapple.estimate.beginning import Known
-from dapple.estimate.forecast import COMPILING, SNAKEMAKE, Cost
+from dapple.estimate.forecast import COMPILING, SNAKEMAKE, Cost, Forecast
 from dapple.estimate.planned import ASKED, INTERRUPTED, MISSING, Job
 from dapple.estimate.sizes import points_of, sizes
 from dapple.formats import clouds
@@ -28,6 +28,10 @@ SIZES = {"one": 1.0, "shots": 1e6, "sensor_times": 100.0}
 
 def told(jobs, cores=1, slowness=1.0, **more):
     return forecast.forecast(jobs, SIZES, COSTS, cores=cores, slowness=slowness, **more)
+
+
+def lasting(seconds):
+    return Forecast((), seconds, 0.0, (), 0)
 
 
 # How long
@@ -65,7 +69,14 @@ def test_what_a_step_took_before_counts_more_than_the_table():
 def test_steps_that_were_never_measured_are_named():
     found = told([Job("scan"), Job("survey_scan")])
     assert found.unknown == ("survey_scan",)
-    assert "survey_scan" in telling.table(found, 1)
+    assert "1 step (survey_scan)" in telling.table(found, 1)
+
+
+def test_the_time_of_a_run_with_steps_that_were_never_measured_is_a_lower_bound():
+    found = told([Job("scan"), *[Job("survey_scan")] * 19])
+    said = telling.sentence([Job("scan")] * 20, 20, found, [], is_first=True)
+    assert said.startswith("20 steps, at least 10 s, without 19 steps that were never measured: ")
+    assert "In all at least 10 s" in telling.table(found, 1)
 
 
 def test_nothing_planned_takes_no_time():
@@ -132,19 +143,26 @@ def test_keys_that_came_or_went_are_edits():
 
 
 @pytest.mark.parametrize(
-    ("jobs", "total", "seconds", "edits", "is_first", "said"),
+    ("jobs", "total", "found", "edits", "is_first", "said"),
     [
         ([], 5, None, [], False, "Nothing to do"),
-        ([Job("a")] * 5, 5, 130.0, [], True, "5 steps, about 2 min: nothing of this run"),
-        ([Job("a")], 5, 40.0, ["n is 2 (was 1)"], False, "1 of 5 steps, about 40 s, because n is"),
+        ([Job("a")] * 5, 5, lasting(130.0), [], True, "5 steps, about 2 min: nothing of this run"),
+        (
+            [Job("a")],
+            5,
+            lasting(40.0),
+            ["n is 2 (was 1)"],
+            False,
+            "1 of 5 steps, about 40 s, because n is",
+        ),
         ([Job("a", causes=("x.py",))], 5, None, [], False, "1 of 5 steps, because x.py changed."),
         ([Job("a", causes=(MISSING,))], 5, None, [], False, f"because {MISSING}."),
         ([Job("a", causes=(INTERRUPTED, MISSING))], 5, None, [], False, f"because {INTERRUPTED}."),
         ([Job("a", causes=(ASKED,))], 5, None, [], False, f"because {ASKED}."),
     ],
 )
-def test_one_sentence_says_what_will_run_and_why(jobs, total, seconds, edits, is_first, said):
-    assert said in telling.sentence(jobs, total, seconds, edits, is_first)
+def test_one_sentence_says_what_will_run_and_why(jobs, total, found, edits, is_first, said):
+    assert said in telling.sentence(jobs, total, found, edits, is_first)
 
 
 def test_many_causes_are_not_all_listed():

@@ -72,9 +72,8 @@ def expected(jobs: Sequence[Job], known: Known) -> Forecast | None:
 def tell(jobs: Sequence[Job], total: int, known: Known) -> str:
     """One sentence: how many steps of how many, for how long, and why."""
     found = expected(jobs, known)
-    seconds = found.seconds if found else None
     is_first = known.edits is None
-    return telling.sentence(jobs, total, seconds, known.edits or (), is_first)
+    return telling.sentence(jobs, total, found, known.edits or (), is_first)
 
 
 def _slowness(

@@ -69,12 +69,15 @@ class Forecast:
         Most memory at a time.
     unknown : tuple of str
         Rules whose cost was never measured; their jobs count nothing.
+    unmeasured : int
+        Jobs of these rules.
     """
 
     rows: tuple[tuple[str, int, float, float], ...]
     seconds: float
     peak_mb: float
     unknown: tuple[str, ...]
+    unmeasured: int
 
 
 def kind_of(reconstruction: str) -> str:
@@ -157,6 +160,7 @@ def forecast(
         work,
         _together(peaks, cores),
         tuple(rule for rule, (_, _, mb) in sums.items() if not mb),
+        sum(int(n) for n, _, mb in sums.values() if not mb),
     )
 
 

@@ -10,7 +10,11 @@ MOST_CAUSES = 3
 
 
 def sentence(
-    jobs: Sequence[Job], total: int, seconds: float | None, edits: Sequence[str], is_first: bool
+    jobs: Sequence[Job],
+    total: int,
+    forecast: Forecast | None,
+    edits: Sequence[str],
+    is_first: bool,
 ) -> str:
     """How many steps will run, for how long, and why.
 
@@ -20,7 +24,7 @@ def sentence(
         That are to run.
     total : int
         Jobs that the run has in all.
-    seconds : float or None
+    forecast : Forecast or None
         None where nothing is known of this machine.
     edits : sequence of str
         What was changed in the configuration since the last run.
@@ -29,9 +33,10 @@ def sentence(
     """
     if not jobs:
         return "Nothing to do: all results are there, and nothing that they depend on has changed."
-    steps = f"{len(jobs)} of {total} steps" if len(jobs) < total else f"{total} steps"
-    steps = "1 step" if total == 1 else steps
-    about = "" if seconds is None else f", about {duration(seconds)}"
+    steps = f"{len(jobs)} of {_steps(total)}" if len(jobs) < total else _steps(total)
+    about = "" if forecast is None else f", {_time(forecast)}"
+    if forecast and forecast.unmeasured:
+        about += f", without {_steps(forecast.unmeasured)} that were never measured"
     if is_first:
         return f"{steps}{about}: nothing of this run has been made yet."
     return f"{steps}{about}, because {_listed(causes(jobs, edits))}."
@@ -56,13 +61,26 @@ def table(forecast: Forecast, cores: int) -> str:
         for rule, jobs, seconds, megabytes in forecast.rows
     ]
     plural = "cores" if cores > 1 else "core"
+    bound = "at least" if forecast.unmeasured else "up to"
     lines.append(
-        f"In all about {duration(forecast.seconds)} on {cores} {plural}, "
-        f"and up to {forecast.peak_mb / 1000:.1f} GB of memory."
+        f"In all {_time(forecast)} on {cores} {plural}, "
+        f"and {bound} {forecast.peak_mb / 1000:.1f} GB of memory."
     )
     if forecast.unknown:
-        lines.append(f"Not counted, because never measured: {', '.join(sorted(forecast.unknown))}.")
+        lines.append(
+            f"Not counted, because never measured: {_steps(forecast.unmeasured)} "
+            f"({', '.join(sorted(forecast.unknown))})."
+        )
     return "\n".join(lines)
+
+
+def _time(forecast: Forecast) -> str:
+    """A lower bound where some steps were never measured."""
+    return f"{'at least' if forecast.unmeasured else 'about'} {duration(forecast.seconds)}"
+
+
+def _steps(count: int) -> str:
+    return "1 step" if count == 1 else f"{count} steps"
 
 
 def _listed(parts: Sequence[str]) -> str:

@@ -14,6 +14,8 @@ from dapple.report.quantities import Quantity, quantity
 
 EMPTY = "–"
 """Stands where nothing is known."""
+LEAST = 1e-4
+"""Smaller numbers are not told apart."""
 MOST_ROWS = 25
 """Longer tables are folded."""
 NAMES = ("reconstruction", "step")
@@ -183,13 +185,16 @@ def cell(value: Any, digits: int = 3, named: Callable[[str], str] = str) -> Cell
 
 
 def number(value: float, digits: int = 3) -> str:
-    """A number with so many significant digits, all those before the point, a true minus sign."""
+    """A number with so many significant digits, all those before the point, a true minus sign.
+
+    What is nearer to 0 than `LEAST` is said to be so.
+    """
     if digits == 0:
         return f"{value:,.0f}".replace(",", "\u2009").replace("-", "−")
     if value == 0:
         return "0"
+    if abs(value) < LEAST:
+        return f"< {LEAST:.4f}" if value > 0 else f"> −{LEAST:.4f}"
     magnitude = int(f"{value:.{digits - 1}e}".split("e")[1])
     places = max(digits - 1 - magnitude, 0)
-    if places > 6:
-        return f"{value:.{digits - 1}e}".replace("-", "−")
     return f"{round(value, places):,.{places}f}".replace(",", "\u2009").replace("-", "−")
