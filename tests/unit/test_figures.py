@@ -6,6 +6,7 @@ import pandas as pd
 import pytest
 import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from tests import legibility
 
 from dapple.errors import InputError
 from dapple.figures import boxplot, daily_courses, ground_map, painter, scatter, style, tree
@@ -118,9 +119,6 @@ FIGURES = {
     "scatter_of_four": lambda: scatter.draw(records("abcd"), overall()),
     "scatter_of_five": lambda: scatter.draw(records("abcde"), overall()),
 }
-PRINT_WIDTH_IN = 7.1
-"""Of a page of two columns (180 mm)."""
-LEAST_PRINTED_PT = 5.5
 
 
 @pytest.mark.parametrize("name", FIGURES)
@@ -141,29 +139,21 @@ def test_the_same_data_give_the_same_bytes_whatever_the_caller_has_set(name, tmp
 
 @pytest.mark.parametrize("name", FIGURES)
 def test_every_figure_names_a_unit_or_a_quantity_without_one(name):
-    figure = FIGURES[name]()
-    words = [text.get_text() for text in figure.texts]
-    words += [label for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel())]
-    assert any(unit in " ".join(words) for unit in ("[m]", f"[{style.PAR_UNIT}]", "Pearson's r"))
+    words = legibility.words_of_axes(FIGURES[name]())
+    assert any(unit in words for unit in ("[m]", f"[{style.PAR_UNIT}]", "Pearson's r"))
 
 
 @pytest.mark.parametrize("name", FIGURES)
 def test_every_word_can_be_read_in_print(name):
-    figure = FIGURES[name]()
-    shrunk = min(1, PRINT_WIDTH_IN / figure.get_figwidth())
-    figure.draw_without_rendering()
-    words = [one for one in figure.findobj(mpl.text.Text) if one.get_text() and one.get_visible()]
-    assert min(one.get_fontsize() for one in words) * shrunk >= LEAST_PRINTED_PT
+    printed_pt = legibility.smallest_printed_pt(FIGURES[name]())
+    assert printed_pt >= legibility.LEAST_PRINTED_PT
 
 
 @pytest.mark.parametrize("name", FIGURES)
 def test_no_title_or_label_is_cut_off(name):
     figure = FIGURES[name]()
-    figure.draw_without_rendering()
-    drawn = figure.get_tightbbox()
-    assert min(drawn.x0, drawn.y0) > -0.02
-    assert drawn.x1 < figure.get_figwidth() + 0.02
-    assert drawn.y1 < figure.get_figheight() + 0.02
+    assert legibility.is_whole(figure)
+    assert legibility.overwritten_titles(figure) == []
 
 
 def test_a_figure_lies_as_png_and_pdf(tmp_path):

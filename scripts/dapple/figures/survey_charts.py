@@ -82,8 +82,12 @@ def shadow_maps(maps: Mapping[str, np.ndarray], cell_size_m: float) -> Figure:
             image = ax.imshow(values.T, origin="lower", extent=reach, vmin=0, vmax=100,
                               cmap="cividis")  # fmt: skip
             ax.grid(False)
-            ax.set_title(f"{name.replace('/', ', ')}: {('lower', 'middle', 'upper')[level]} third",
-                         fontsize=7.5)  # fmt: skip
+        stand, _, design = name.partition("/")
+        row[0].set_ylabel(f"{stand}, {design}\n[m]")
+    for ax, level in zip(grid[0], ("lower", "middle", "upper"), strict=True):
+        ax.set_title(f"{level} third")
+    for ax in grid[-1]:
+        ax.set_xlabel("[m]")
     figure.colorbar(image, ax=grid, label="relative shadow [%]", shrink=0.5)
     return figure
 
