@@ -84,8 +84,8 @@ def shadow_maps(maps: Mapping[str, np.ndarray], cell_size_m: float) -> Figure:
             ax.grid(False)
         stand, _, design = name.partition("/")
         row[0].set_ylabel(f"{stand}, {design}\n[m]")
-    for ax, level in zip(grid[0], ("lower", "middle", "upper"), strict=True):
-        ax.set_title(f"{level} third")
+    for ax, third in zip(grid[0], ("lower", "middle", "upper"), strict=True):
+        ax.set_title(f"{third} third")
     for ax in grid[-1]:
         ax.set_xlabel("[m]")
     figure.colorbar(image, ax=grid, label="relative shadow [%]", shrink=0.5)
