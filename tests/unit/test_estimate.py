@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from dapple.config.settings import validate
-from dapple.estimate import beginning, forecast, planned, speed, telling
+from dapple.estimate import beginning, forecast, machine, planned, speed, telling
 from dapple.estimate.beginning import Known
 from dapple.estimate.forecast import COMPILING, SNAKEMAKE, Cost, Forecast
 from dapple.estimate.planned import ASKED, INTERRUPTED, MISSING, Job
@@ -125,6 +125,32 @@ def test_a_cloud_that_is_not_there_has_no_points(tmp_path):
     assert points_of(tmp_path / "none.laz") == 0
 
 
+@pytest.mark.parametrize(("suffix", "bytes_a_point"), [("e57", 16), ("laz", 8)])
+def test_points_of_a_file_without_a_count_follow_from_its_length(tmp_path, suffix, bytes_a_point):
+    (tmp_path / f"cloud.{suffix}").write_bytes(bytes(200_000))
+    found = points_of(tmp_path / f"cloud.{suffix}")
+    assert 200_000 / bytes_a_point / 3 < found < 200_000 / bytes_a_point * 3
+
+
+def test_a_user_s_tree_has_the_points_of_its_file_and_the_sensors_of_its_table(tmp_path):
+    cloud = Cloud(np.random.default_rng(1).normal(size=(5000, 3)))
+    clouds.write(tmp_path / "tree.laz", cloud)
+    (tmp_path / "sensors.csv").write_text("sensor,x_m,y_m,z_m\na,0,0,1\nb,1,0,1\n")
+    given = {
+        "source": "cloud",
+        "data_dir": str(tmp_path),
+        "cloud": {"path": "tree.laz"},
+        "sensors": {"kind": "table", "path": "sensors.csv"},
+        "measured": {"kind": "none"},
+    }
+    found = sizes(validate(given))
+    assert found["points"] == found["kept"] == 5000
+    assert found["sensors"] == 2
+    assert found["sensor_times"] % 2 == 0
+    without = sizes(validate(given | {"sensors": {"kind": "none"}}))
+    assert (without["sensors"], without["sensor_times"]) == (0, 0)
+
+
 # Why
 
 
@@ -163,6 +189,43 @@ def test_keys_that_came_or_went_are_edits():
 )
 def test_one_sentence_says_what_will_run_and_why(jobs, total, found, edits, is_first, said):
     assert said in telling.sentence(jobs, total, found, edits, is_first)
+
+
+def test_the_configuration_of_the_run_before_is_that_beside_its_results(tmp_path):
+    assert beginning.configuration_before(tmp_path) is None
+    (tmp_path / "config.yaml").write_text("seed: 7\n")
+    assert beginning.configuration_before(tmp_path) == {"seed": 7}
+    for broken in ("seed: [7\n", "just words\n"):
+        (tmp_path / "config.yaml").write_text(broken)
+        assert beginning.configuration_before(tmp_path) is None
+
+
+def test_a_machine_is_as_slow_as_its_steps_were_in_the_run_before(tmp_path):
+    """The table has the scan at 2 s and a microsecond a shot: 3 s for a million."""
+    before = sizes(validate({}))
+    known = Known(tmp_path, 1, before, earlier=before)
+    own = forecast.cost_of(Job("scan"), forecast.read()).seconds(before[forecast.DRIVERS["scan"]])
+    as_before = [Job("scan", before=(k * own, 300.0)) for k in (1.0, 5.0)]
+    fast, slow = (beginning._slowness(tmp_path / "none", [job], before, forecast.read())
+                  for job in as_before)  # fmt: skip
+    assert (fast, slow) == pytest.approx((1.0, 5.0))
+    assert (
+        beginning.expected(as_before[1:], known).seconds
+        > beginning.expected(as_before[:1], known).seconds
+    )
+
+
+def test_the_middle_of_several_tries_is_what_counts():
+    """One try beside another program on the machine says nothing."""
+    ticks = iter([0.0, 1.0, 10.0, 90.0, 100.0, 102.0])
+    assert machine._median(lambda: None, 3, lambda: next(ticks)) == 2.0
+
+
+def test_a_program_starts_and_neighbours_are_found_in_some_time(monkeypatch):
+    monkeypatch.setattr(machine, "STARTS", 1)
+    monkeypatch.setattr(machine, "SEARCHES", 1)
+    monkeypatch.setattr(machine, "POINTS", 1000)
+    assert all(taken > 0 for taken in machine.measure().values())
 
 
 def test_many_causes_are_not_all_listed():

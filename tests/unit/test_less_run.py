@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 
 pytest.importorskip("less", reason="less3d 3.0.0 is not installed")
 
-from dapple.light import less_run
+from dapple.light import less_engine, less_run
+from dapple.scene.scene_optics import Optics
 
 DIAMETER_DEG = 0.53
 
@@ -77,3 +79,22 @@ def test_light_of_bands_between_those_that_are_told_lies_between_them():
     assert radiance.shape == (1, 16, 32)
     assert radiance[0, 0] == pytest.approx(9.0)
     assert radiance[0, 1:] == pytest.approx(3.0)
+
+
+def test_bands_in_groups_keep_the_light_in_the_order_of_their_wavelengths():
+    """LESS follows three groups in place of all bands; their light is that of all."""
+    wavelength_nm = np.linspace(450.0, 690.0, 7)
+    leaf = np.array([0.05, 0.06, 0.2, 0.22, 0.21, 0.06, 0.05])  # dark in blue and red
+    optics = Optics.of_tree(wavelength_nm, leaf, 0.5 * leaf, 0.3 * leaf, 0.1 + 0.0 * leaf)
+    beam, diffuse = np.arange(14.0).reshape(2, 7), np.full((2, 7), 3.0)
+    sky = xr.Dataset(
+        dict(zip(less_engine.FLUXES, ((("time", "band"), x) for x in (beam, diffuse)), strict=True))
+    )
+    fluxes, grouped = less_engine.in_groups(sky, optics, 2)
+    for name, whole in zip(less_engine.FLUXES, (beam, diffuse), strict=True):
+        assert fluxes[name].sum("band").to_numpy() == pytest.approx(whole.sum(axis=1))
+    assert (np.diff(grouped.wavelength_nm) > 0).all()
+    dark, green = np.sort(grouped.reflectance["leaf"])
+    assert dark < 0.07
+    assert green > 0.2
+    assert less_engine.in_groups(sky, optics, 7) == (sky, optics)

@@ -4,12 +4,15 @@ import struct
 
 import laspy
 import numpy as np
+import pye57
 import pyproj
 import pytest
+from pye57 import libe57
 from tests.unit.test_cloud_readers import XYZ, described, las, ply_text
 
 from dapple.errors import InputError
 from dapple.formats import cloud_crs, clouds
+from dapple.formats.cloud_raw import AT_SCANNER
 
 AXES = [f"property float {axis}" for axis in "xyz"]
 
@@ -160,3 +163,80 @@ def test_a_broken_system_is_a_note_for_points_and_an_error_for_crowns(tmp_path):
         cloud_crs.horizontal(tmp_path / "none.las", "")
     with pytest.raises(InputError, match="as in EPSG:25832"):
         cloud_crs.horizontal(las(tmp_path / "b.las"), "EPSG:0")
+
+
+def e57(path, **fields):
+    """A scan with these fields, as another program than pye57 may write it."""
+    imf = pye57.E57(str(path), mode="w")
+    scan = libe57.StructureNode(imf.image_file)
+    scan.set("guid", libe57.StringNode(imf.image_file, "{1}"))
+    prototype = libe57.StructureNode(imf.image_file)
+    buffers = libe57.VectorSourceDestBuffer()
+    columns = {name: np.asarray(values, float) for name, values in fields.items()}
+    for name in columns:
+        node = libe57.FloatNode(imf.image_file, 0.0, libe57.E57_DOUBLE, -1e6, 1e6)
+        if name.endswith("Index") or name.startswith("return"):
+            node = libe57.IntegerNode(imf.image_file, 0, 0, 10_000)
+        prototype.set(name, node)
+    points = libe57.CompressedVectorNode(
+        imf.image_file, prototype, libe57.VectorNode(imf.image_file, True)
+    )
+    scan.set("points", points)
+    imf.data3d.append(scan)
+    for name, column in columns.items():
+        buffers.append(
+            libe57.SourceDestBuffer(imf.image_file, name, column, len(column), True, True)
+        )
+    writer = points.writer(buffers)
+    writer.write(len(column))
+    writer.close()
+    imf.close()
+    return path
+
+
+def test_ranges_and_angles_of_an_e57_become_places_and_a_range_of_nothing_a_miss(tmp_path):
+    quarter = np.pi / 2
+    path = e57(
+        tmp_path / "a.e57",
+        sphericalRange=[2.0, 2.0, 2.0, 0.0],
+        sphericalAzimuth=[0.0, quarter, 0.0, 0.3],
+        sphericalElevation=[0.0, 0.0, quarter, 0.1],
+    )
+    cloud, source = clouds.read_with_source(path)
+    assert cloud.world_xyz_m == pytest.approx(2 * np.eye(3), abs=1e-9)
+    assert source.left_out == {AT_SCANNER: 1}
+
+
+def test_returns_that_share_a_cell_are_one_shot_numbered_from_the_scanner_on(tmp_path):
+    """Without any word on borders of rows and columns."""
+    path = e57(
+        tmp_path / "a.e57",
+        cartesianX=[9.0, 3.0, 5.0, 5.0, 5.0],
+        cartesianY=[0.0, 0.0, 1.0, 2.0, 3.0],
+        cartesianZ=[0.0, 0.0, 1.0, 1.0, 1.0],
+        columnIndex=[0, 0, 0, 1, 1],
+        rowIndex=[0, 0, 1, 0, 1],
+    )
+    found = clouds.read(path).attributes
+    assert found["ReturnNumber"].tolist() == [2, 1, 1, 1, 1]
+    assert found["NumberOfReturns"].tolist() == [2, 2, 1, 1, 1]
+
+
+def test_returns_of_an_e57_count_from_nought(tmp_path):
+    path = e57(
+        tmp_path / "a.e57",
+        cartesianX=[9.0, 3.0],
+        cartesianY=[0.0, 0.0],
+        cartesianZ=[0.0, 1.0],
+        returnIndex=[1, 0],
+        returnCount=[2, 2],
+    )
+    found = clouds.read(path).attributes
+    assert found["ReturnNumber"].tolist() == [2, 1]
+    assert found["NumberOfReturns"].dtype == np.uint8
+
+
+def test_an_e57_without_places_is_refused(tmp_path):
+    path = e57(tmp_path / "a.e57", cartesianX=[9.0, 3.0], cartesianY=[0.0, 0.0])
+    with pytest.raises(InputError, match="Copy or export the file again"):
+        clouds.read(path)
