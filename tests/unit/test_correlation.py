@@ -122,6 +122,19 @@ def test_one_sensor_has_no_interval_and_says_why(caplog):
     assert "one sensor" in caplog.text
 
 
+def test_light_that_does_not_vary_has_neither_interval_nor_model_and_says_why():
+    constant = records().assign(simulated=500.0)
+    assert "constant" in correlation.bootstrap_interval(constant, seed=1).note
+    assert "constant" in one(correlation.mixed_model(constant))["note"]
+    nothing = correlation.bootstrap_interval(records().iloc[:0], seed=1)
+    assert np.isnan(nothing.low)
+    assert "no record" in nothing.note
+
+
+def test_a_model_needs_more_records_than_it_has_parameters():
+    assert "no more records" in one(correlation.mixed_model(records(3, 1)))["note"]
+
+
 def test_the_interval_of_two_sensors_is_called_too_narrow(caplog):
     correlation.overall(records(n_sensors=2, noise=400.0), seed=1)
     assert "only 2 sensors: the limits are too narrow" in caplog.text

@@ -1,5 +1,6 @@
 """Point clouds with odd or damaged parts: what can be read is, the rest is told or refused."""
 
+import dataclasses
 import struct
 
 import laspy
@@ -10,8 +11,9 @@ import pytest
 from pye57 import libe57
 from tests.unit.test_cloud_readers import XYZ, described, las, ply_text
 
-from dapple.errors import InputError
-from dapple.formats import cloud_crs, clouds
+from dapple.cloud import voxel_groups
+from dapple.errors import EmptyCloudError, InputError
+from dapple.formats import cloud_crs, clouds, ply, shots
 from dapple.formats.cloud_raw import AT_SCANNER
 
 AXES = [f"property float {axis}" for axis in "xyz"]
@@ -47,6 +49,25 @@ def test_an_offset_of_extra_bytes_is_added_and_a_scale_of_nothing_is_none(tmp_pa
     scaled = described("Reflectance", 4, options=8, scale=0.0)
     found = clouds.read(las(tmp_path / "b.las", extra=raw, records=[scaled]))
     assert set(found.attributes["Reflectance"]) == {6}
+
+
+@pytest.mark.parametrize(
+    ("at", "form", "values", "said"),
+    [
+        (94, "<H", [20], "a header of 20 bytes"),
+        (96, "<I", [10**9], "points are to begin at 1,000,000,000"),
+        (104, "<B", [42], "point format 42"),
+        (105, "<H", [12], "points of 12 bytes"),
+        (131, "<3d", [0.0, 1.0, 1.0], "a scale of"),
+        (155, "<3d", [np.nan, 0.0, 0.0], "an offset of"),
+    ],
+)
+def test_a_header_that_contradicts_itself_is_refused(tmp_path, at, form, values, said):
+    raw = bytearray(las(tmp_path / "a.las").read_bytes())
+    struct.pack_into(form, raw, at, *values)
+    (tmp_path / "a.las").write_bytes(raw)
+    with pytest.raises(InputError, match=said):
+        clouds.read(tmp_path / "a.las")
 
 
 def laz(path):
@@ -240,3 +261,82 @@ def test_an_e57_without_places_is_refused(tmp_path):
     path = e57(tmp_path / "a.e57", cartesianX=[9.0, 3.0], cartesianY=[0.0, 0.0])
     with pytest.raises(InputError, match="Copy or export the file again"):
         clouds.read(path)
+
+
+PTX = ["2", "1", "1 2 3", "1 0 0", "0 1 0", "0 0 1", "1 0 0 0", "0 1 0 0", "0 0 1 0", "1 2 3 1"]
+
+
+@pytest.mark.parametrize(
+    ("line", "text", "said"),
+    [
+        (2, "1 2", "without position and 4 × 4 matrix"),
+        (9, "1 nan 3 1", "numbers that are not finite"),
+        (6, "2 0 0 0", "rotat"),
+        (10, "1 2 3 4 5", "5 columns in scan 1"),
+        (10, "", "an empty line among the shots"),
+    ],
+)
+def test_a_ptx_that_cannot_be_says_what_of_it(tmp_path, line, text, said):
+    lines = [*PTX, "1 1 1 0.5", "0 0 0 0.5"]
+    lines[line] = text
+    lines[11] = " ".join(["0"] * len(lines[10].split())) or lines[11]
+    (tmp_path / "a.ptx").write_text("\n".join(lines) + "\n")
+    with pytest.raises(InputError, match=said):
+        clouds.read(tmp_path / "a.ptx")
+
+
+def test_a_scan_that_met_nothing_has_shots_and_no_points(tmp_path):
+    (tmp_path / "a.ptx").write_text("\n".join([*PTX, "0 0 0 0.5", "0 0 0 0.5"]) + "\n")
+    with pytest.raises(EmptyCloudError):
+        clouds.read(tmp_path / "a.ptx")
+
+
+def mesh_file(path, corners="vertex_indices", face=(0, 1, 2), faces=1):
+    """A triangle in a PLY as dapple reads meshes."""
+    head = ["ply", "format binary_little_endian 1.0", "element vertex 3", *AXES]
+    if faces:
+        head += ["element face 1", f"property list uchar int {corners}"]
+    body = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4").tobytes()
+    body += struct.pack(f"<B{len(face)}i", len(face), *face) if faces else b""
+    path.write_bytes("\n".join([*head, "end_header", ""]).encode() + body)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"corners": "edges"}, "faces that are not triangles"),
+        ({"face": (0, 1, 2, 0)}, "faces that are not triangles"),
+        ({"face": (0, 1, 7)}, "vert"),
+        ({"faces": 0}, "no vertices or no faces"),
+    ],
+)
+def test_a_mesh_of_anything_but_triangles_of_its_own_corners_is_refused(tmp_path, given, said):
+    assert ply.read(mesh_file(tmp_path / "a.ply"))[1].tolist() == [[0, 1, 2]]
+    with pytest.raises(InputError, match=said):
+        ply.read(mesh_file(tmp_path / "b.ply", **given))
+
+
+def test_voxels_have_a_size_and_their_numbers_an_end():
+    far = np.array([[0.0, 0.0, 0.0], [1e7, 1e7, 1e7]])
+    with pytest.raises(InputError, match="a size above 0 m"):
+        voxel_groups.group(far, 0.0)
+    with pytest.raises(InputError, match="an extent of"):
+        voxel_groups.group(far, 1e-3)
+
+
+def test_more_voxels_than_may_be_are_made_larger_until_they_are_few_enough():
+    points = np.random.default_rng(5).uniform(0, 1, (2000, 3))
+    groups, middle, size_m = voxel_groups.nodes(points, 0.01, 100)
+    assert len(groups.start) <= 100
+    assert 0.01 < size_m < 1.0
+    assert np.average(middle, axis=0, weights=groups.size) == pytest.approx(points.mean(axis=0))
+
+
+def test_shots_of_none_and_of_two_kinds_cannot_be_put_together():
+    with pytest.raises(InputError, match="at least one chunk"):
+        shots.concatenate([])
+    plain = shots.Shots.none(np.zeros(3))
+    told = dataclasses.replace(plain, truth=np.zeros(0, np.uint8))
+    with pytest.raises(InputError, match="Drop the truth of all"):
+        shots.concatenate([plain, told])

@@ -75,6 +75,22 @@ REFUSED = {
         "# Observation period;TOA;GHI\n2023-08-10T10:00:00.0;300;200\n",
         "rows without a period",
     ),
+    "KNMI with an hour beyond the day": (
+        "# STN,YYYYMMDD,HH,Q\n260,20230810,25,180\n",
+        "day '20230810' and hour '25'",
+    ),
+    "SURFRAD cut after its clock": (
+        " Boulder\n  40.125 -105.237 1689 m version 1\n 2023 222 8 10 0 0 0.0\n",
+        "a day of 48 columns",
+    ),
+    "MIDC without a day": (
+        "Year,DOY,MST,Global Horizontal [W/m^2]\n2023,none,0900,701\n",
+        "a row without a day",
+    ),
+    "EPW cut within its rows": (
+        "LOCATION,Freiburg,-,DEU,TMY,1,48.0,7.8,1.0,230\n" + "X\n" * 7 + "2023,8,10,10,60,C9\n",
+        "35, as EPW has",
+    ),
     "CAMS without rows": ("# Observation period;TOA;GHI;DHI\n", "rows without a period"),
 }
 
@@ -85,3 +101,10 @@ def test_a_file_of_a_service_that_is_not_whole_is_refused_with_what_to_do(tmp_pa
     with pytest.raises(InputError) as found:
         user_tables.read(written(tmp_path, text))
     assert said in str(found.value)
+
+
+def test_a_day_of_the_year_is_a_day(tmp_path):
+    text = "Year,DOY,MST,Global Horizontal [W/m^2]\n2023,222,900,701\n2023,222,0901,702\n"
+    table = user_tables.read(written(tmp_path, text))
+    assert table.layout == "MIDC"
+    assert table.text("time").tolist() == ["2023-08-10 09:00", "2023-08-10 09:01"]
