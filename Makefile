@@ -37,9 +37,10 @@ format: setup
 	$(BIN)/ruff format .
 	$(BIN)/snakefmt Snakefile rules
 
-# Lines that unit tests and closed forms run; jobs of the small runs are processes of their own.
+# Lines that unit tests, closed forms and the jobs of small runs reach; tracing makes jobs slow.
 coverage: setup
-	$(BIN)/python -m pytest -q -n $(CORES) --cov --cov-report=term tests/unit tests/physics
+	$(BIN)/python -m pytest -q -n $(CORES) --timeout 6000 --cov --cov-report=term \
+		tests/unit tests/physics tests/workflow/test_small_*.py
 
 # Other programs on the shots of the default run, each in an environment of its own.
 peers: setup
