@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.unit.test_check import one_tree, settings
 
-from dapple.check import cloud_facts, page, shots_check
+from dapple.check import cloud_facts, cloud_findings, page, shots_check
 from dapple.check.inspection import inspect
 from dapple.formats.cloud_raw import MISSED, ScanFacts, Source
 from dapple.formats.clouds import Cloud
@@ -190,6 +190,53 @@ def test_many_sources_of_points_are_no_scans():
     many = Cloud(cloud.xyz_m, attributes={"PointSourceId": np.arange(len(cloud))})
     assert facts(many).numbers["scans"] == []
     assert [row["points"] for row in facts(two_scans()).numbers["scans"]] == [4500, 4500]
+
+
+# What else a cloud shows
+
+
+def judged(cloud, source=None, **sections):
+    found = cloud_findings.judge(facts(cloud, **(source or {})), settings(**sections), "tree.laz")
+    return [(one.level, one.found) for one in found]
+
+
+def reflecting(middle_db):
+    """A tree whose reflectances lie 3 dB about a value."""
+    cloud = one_tree()
+    values = np.linspace(middle_db - 3, middle_db + 3, len(cloud)).astype(np.float32)
+    return Cloud(cloud.xyz_m, attributes={"Reflectance": values})
+
+
+def test_points_far_off_are_told_from_a_plot_that_is_too_wide():
+    tree = one_tree().xyz_m
+    stray = Cloud(np.concatenate([tree, tree[:5] + np.array([4000.0, 0.0, 0.0])]))
+    (said,) = [text for level, text in judged(stray) if level == "warning" and " across" in text]
+    whole, core = (float(part.split()[0].replace(",", "")) for part in said.split(", "))
+    assert whole > 4000
+    assert core < 10
+
+
+def test_without_reflectance_leaf_and_wood_are_told_by_shape_and_it_is_said():
+    auto = {"classify": {"method": "auto"}}
+    by_shape = ("note", "no reflectance in dB: leaf and wood are told by shape")
+    assert by_shape in judged(one_tree(), **auto)
+    assert by_shape in judged(one_tree(Reflectance=3000), **auto)
+    assert by_shape not in judged(reflecting(-8.0), **auto)
+
+
+@pytest.mark.parametrize(("reflectance_db", "side"), [(-14.0, "below"), (-1.0, "above")])
+def test_a_threshold_beside_all_reflectances_tells_nothing_apart(reflectance_db, side):
+    by_threshold = {"classify": {"method": "reflectance"}}
+    said = judged(reflecting(reflectance_db), **by_threshold)
+    assert [
+        text for level, text in said if level == "warning" and f"all reflectances {side}" in text
+    ]
+
+
+def test_what_was_left_out_is_counted_and_nothing_is_said_of_none():
+    said = judged(one_tree(), {"in_file": 9100, "left_out": {"withheld": 100, "synthetic": 0}})
+    assert ("note", "100 of 9,100 records left out: withheld") in said
+    assert not [text for _, text in said if "synthetic" in text]
 
 
 # What is printed of it

@@ -423,3 +423,29 @@ def test_shots_that_tell_nothing_of_discs_are_none(scanned_wall):
     told = signals.measure(a_run(surfels=leaves, surfel_facts={"without_surface": 0.2}))
     assert math.isnan(told["shots_per_surfel"])
     assert told["surfels_without_surface"] == 0.2
+
+
+def test_scans_of_points_without_shots_are_those_that_the_points_name():
+    xyz = rng().uniform(size=(60, 3))
+    named = Cloud(xyz, attributes={"PointSourceId": np.arange(60) % 3 + 1})
+    assert signals_scan.scan_count(None, named) == 3
+    assert math.isnan(signals_scan.scan_count(None, Cloud(xyz)))
+    unnamed = Cloud(xyz, attributes={"PointSourceId": np.zeros(60, int)})
+    assert math.isnan(signals_scan.scan_count(None, unnamed))
+
+
+def test_without_a_crown_or_a_sun_nothing_is_on_the_way_of_its_beams():
+    full, bare = voxels(np.full((3, 3, 3), 1.0)), voxels(np.zeros((3, 3, 3)))
+    sensor = np.array([[0.3, 0.3, 0.0]])
+    for grid, zenith_deg in ((full, 95.0), (bare, 20.0)):
+        found = signals_scan.on_sun_beams(
+            grid, sensor, np.array([zenith_deg]), np.array([180.0]), rng()
+        )
+        assert np.isnan(found).all()
+    assert math.isnan(signals_scan.seen_share(bare))
+
+
+def test_a_scan_without_neighbours_fits_none():
+    xyz = rng().uniform(size=(200, 3))
+    lone = Cloud(xyz, attributes={"PointSourceId": np.repeat([1, 2], [190, 10])})
+    assert np.isnan(signals_scan.scan_fit(lone, rng())).all()
