@@ -49,6 +49,27 @@ JobAcctGatherParams=OverMemoryKill
 """Jobs that take more memory than they asked for are killed."""
 
 
+USUAL_PLACE = Path("/etc/slurm/slurm.conf")
+
+
+@contextmanager
+def _found_by_steps(configuration: Path) -> Iterator[None]:
+    """The configuration in the usual place, unless one stands there.
+
+    The executor starts the steps of a job without `SLURM_CONF`, and their `srun` looks there.
+    """
+    if USUAL_PLACE.exists():
+        yield
+        return
+    USUAL_PLACE.parent.mkdir(exist_ok=True)
+    USUAL_PLACE.unlink(missing_ok=True)
+    USUAL_PLACE.symlink_to(configuration)
+    try:
+        yield
+    finally:
+        USUAL_PLACE.unlink()
+
+
 @contextmanager
 def cluster(folder: Path, *, is_limited: bool = False) -> Iterator[dict[str, str]]:
     """A running Slurm; gives the environment in which its programs find it.
@@ -70,10 +91,11 @@ def cluster(folder: Path, *, is_limited: bool = False) -> Iterator[dict[str, str
     environment = os.environ | {"SLURM_CONF": str(configuration)}
     _munge()
     try:
-        for program in ("slurmctld", "slurmd"):
-            subprocess.run([program, "-f", configuration], check=True, env=environment)
-        _wait_until_idle(environment)
-        yield environment
+        with _found_by_steps(configuration):
+            for program in ("slurmctld", "slurmd"):
+                subprocess.run([program, "-f", configuration], check=True, env=environment)
+            _wait_until_idle(environment)
+            yield environment
     finally:
         for name in ("node", "controller"):
             if (pid := folder / f"{name}.pid").is_file():
