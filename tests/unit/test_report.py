@@ -167,7 +167,7 @@ def test_columns_have_units_and_meanings_and_cells_the_number_they_are_sorted_by
     page = written(tmp_path, {"statistics/overall.csv": overall(polygons=1234.5678)})
     assert re.search(r'RMSE</abbr> <span class="unit">µmol m⁻² s⁻¹', page)
     assert "Mean of simulated minus measured." in page
-    assert 'data-key="1234.5678">1\u2009235</td>' in page
+    assert 'data-key="1234.5678">1\u202f235</td>' in page
 
 
 def test_a_page_without_charts_carries_no_library_of_charts():
@@ -177,7 +177,7 @@ def test_a_page_without_charts_carries_no_library_of_charts():
 @pytest.mark.parametrize(
     ("value", "text"),
     [
-        (0.0, "0"), (0.98765, "0.988"), (-0.0123456, "−0.0123"), (123456.7, "123\u2009457"),
+        (0.0, "0"), (0.98765, "0.988"), (-0.0123456, "−0.0123"), (123456.7, "123\u202f457"),
         (99.96, "100"), (1e-9, "< 0.0001"), (-7.16e-5, "> −0.0001"),
     ],
 )  # fmt: skip
@@ -187,7 +187,7 @@ def test_numbers_have_three_digits_that_count(value, text):
 
 def test_whole_numbers_are_counts_and_units_are_read_from_names():
     shown = table(pd.DataFrame({"n": [36, 3600], "reach_m": [0.5, 1.0]}), "x")
-    assert [row[0].text for row in shown.rows] == ["36", "3\u2009600"]
+    assert [row[0].text for row in shown.rows] == ["36", "3\u202f600"]
     assert [row[1].text for row in shown.rows] == ["0.500", "1.00"]
     assert (shown.columns[1].label, shown.columns[1].unit) == ("reach", "m")
 
@@ -232,8 +232,9 @@ def test_studies_without_a_verdict_open_with_what_they_found(tmp_path):
     )
     page = written(tmp_path / "survey", {"survey/shadowing.csv": shadowing})
     assert (
-        "diamond hides least of the filled voxels: 50 % with the finest scans, single 80 %" in page
-    )
+        "With the finest scans, 50 % of the filled voxels stay unseen from the positions of "
+        "diamond, the best of the designs, and 80 % from those of single."
+    ) in page
     thresholds = pd.DataFrame(
         {"stressor": ["noise", "noise", "gap"], "level": [2.0, np.nan, 1.0],
          "reconstruction": ["polygons", "surfels", "polygons"]}

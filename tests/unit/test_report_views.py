@@ -85,7 +85,8 @@ def test_long_series_are_thinned_and_the_caption_says_so(folder, monkeypatch):
 def test_residuals_are_means_of_simulated_minus_measured_by_local_hour(folder):
     by_hour, by_height = residuals.blocks(run_light.read(folder))
     bias = by_hour.data["data"][0]
-    assert bias["name"] == "polygons, bias"
+    assert bias["name"] == "polygons"
+    assert bias["hovertemplate"].startswith("bias")
     assert bias["x"] == [12.5, 13.5]
     assert bias["y"] == [50.0, 50.0]
     assert bias["customdata"] == [12, 12]

@@ -190,11 +190,11 @@ def number(value: float, digits: int = 3) -> str:
     What is nearer to 0 than `LEAST` is said to be so.
     """
     if digits == 0:
-        return f"{value:,.0f}".replace(",", "\u2009").replace("-", "−")
+        return f"{value:,.0f}".replace(",", "\u202f").replace("-", "−")
     if value == 0:
         return "0"
     if abs(value) < LEAST:
         return f"< {LEAST:.4f}" if value > 0 else f"> −{LEAST:.4f}"
     magnitude = int(f"{value:.{digits - 1}e}".split("e")[1])
     places = max(digits - 1 - magnitude, 0)
-    return f"{round(value, places):,.{places}f}".replace(",", "\u2009").replace("-", "−")
+    return f"{round(value, places):,.{places}f}".replace(",", "\u202f").replace("-", "−")

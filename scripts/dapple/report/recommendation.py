@@ -14,6 +14,14 @@ from dapple.verdict.signal_meanings import SIGNALS
 SAYS = {"green": "can be used", "amber": "doubtful", "red": "do not use"}
 KNOWN = "truth"
 """The virtual plant itself: nobody who has a scan can choose it."""
+LOSS = (
+    "Expected loss tells how wrong the light may be: 0 is as good as in an undisturbed virtual "
+    "world, 1 is failure (a fifth of r lost, or the error doubled). From its alarm on, a "
+    "reconstruction is doubted."
+)
+RECORDS_ALONE = (
+    "Wrong sensor positions and clocks leave no trace in a scan: only records show them."
+)
 
 
 def called(name: str) -> str:
@@ -68,8 +76,8 @@ def _by_records(row: pd.Series, verdict: Mapping[str, Any]) -> str:
     name = str(row["reconstruction"])
     r = "" if pd.isna(row["r"]) else f"r = {row['r']:.2f}, "
     text = _typeset(
-        f"Use {called(name)}: of all, their light comes nearest to {row['n']:.0f} records ({r}RMSE "
-        f"{number(row['rmse'])}, bias {row['bias']:+.0f} {PAR_UNIT})"
+        f"Use {called(name)}: of all, their light comes nearest to {number(row['n'], 0)} records "
+        f"({r}RMSE {number(row['rmse'])}, bias {row['bias']:+.0f} {PAR_UNIT})"
     )
     facts = verdict["reconstructions"].get(name)
     if facts is None:
@@ -101,7 +109,7 @@ def _others(names: Sequence[str]) -> list[str]:
 def blocks(verdict: Mapping[str, Any]) -> list[Block]:
     """The verdict on each reconstruction, the best first, with reasons and remedies."""
     judged = verdict["reconstructions"]
-    found: list[Block] = []
+    found: list[Block] = [Text([LOSS])] if judged else []
     for name in sorted(judged, key=lambda name: judged[name]["expected_loss"]):
         facts = judged[name]
         score = f"Expected loss {facts['expected_loss']:.2f}, alarm from {facts['alarm']:.2f}."
@@ -116,15 +124,9 @@ def blocks(verdict: Mapping[str, Any]) -> list[Block]:
     if verdict["unknown"]:
         items = [("Not known", f"{one['text']}. {one['help']}") for one in verdict["unknown"]]
         found.append(Listing(items))
-    notes = [
-        "A loss of 1 is failure: a fifth of r lost, or the error doubled, in virtual worlds that "
-        "were made worse on purpose."
-    ]
     if not verdict["with_records"]:
-        notes.append(
-            "Wrong sensor positions and clocks leave no trace in a scan: only records show them."
-        )
-    return [*found, Text(notes)]
+        found.append(Text([RECORDS_ALONE]))
+    return found
 
 
 def _why(facts: Mapping[str, Any], verdict: Mapping[str, Any]) -> str:

@@ -16,7 +16,7 @@ class Reference:
 
     def cited(self) -> str:
         """As it stands in a list of references."""
-        who = self.author.replace(" and ", ", ")
+        who = self.author.replace(" and others", " et al.").replace(" and ", ", ")
         where = f" {self.journal} {self.place}.".replace(" .", ".") if self.journal else ""
         doi = f" doi:{self.doi}" if self.doi else ""
         return f"{who} ({self.year}). {self.title}.{where}{doi}"

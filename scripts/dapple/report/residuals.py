@@ -64,7 +64,7 @@ def _figure(
                     "x": [float(value) for value in values.index],
                     "y": values.round(1).tolist(),
                     "customdata": grouped.size().tolist(),
-                    "name": f"{label}, {text}",
+                    "name": label,
                     "mode": "lines+markers",
                     "line": line | {"dash": dash},
                     "hovertemplate": f"{text} %{{y:.0f}} {PAR_UNIT}, %{{customdata}} records",
@@ -72,5 +72,6 @@ def _figure(
                     "showlegend": text == "bias",
                 }
             )
-    layout = {"xaxis": {"title": {"text": title}}, "yaxis": {"title": {"text": f"[{PAR_UNIT}]"}}}
+    error_title = f"simulated − measured [{PAR_UNIT}]"
+    layout = {"xaxis": {"title": {"text": title}}, "yaxis": {"title": {"text": error_title}}}
     return {"data": traces, "layout": layout}

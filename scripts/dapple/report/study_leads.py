@@ -20,14 +20,18 @@ def sentences(folder: Path) -> list[str]:
 
 
 def _survey(table: pd.DataFrame) -> Iterator[str]:
-    """Which design hides least, with the finest scans that were tried."""
+    """From which design least stays unseen, with the finest scans that were tried."""
     finest = table[table["n_beams"] == table["n_beams"].max()]
     shadow = finest.groupby("design")["rs"].mean().sort_values()
     best, worst = shadow.index[0], shadow.index[-1]
     yield (
-        f"Of the designs that were tried, {best} hides least of the filled voxels: "
-        f"{_per_cent(shadow.iloc[0])} with the finest scans"
-        + (f", {worst} {_per_cent(shadow.iloc[-1])}." if best != worst else ".")
+        f"With the finest scans, {_per_cent(shadow.iloc[0])} of the filled voxels stay unseen from "
+        f"the positions of {best}"
+        + (
+            f", the best of the designs, and {_per_cent(shadow.iloc[-1])} from those of {worst}."
+            if best != worst
+            else "."
+        )
     )
 
 

@@ -43,7 +43,7 @@ def blocks(folder: Path, names: list[str], first: str) -> Iterator[Block]:
 
 def _caption(shown: list[dict[str, Any]]) -> str:
     parts = [
-        f"{one['label']}: {one['n_shown']:,} of {one['n']:,}".replace(",", "\u2009")
+        f"{one['label']}: {one['n_shown']:,} of {one['n']:,}".replace(",", "\u202f")
         for one in shown
         if one["n_shown"] < one["n"]
     ]

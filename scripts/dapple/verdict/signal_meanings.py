@@ -159,7 +159,7 @@ SIGNALS = {
         -1, "light of polygons and small voxels correlates with {value:.2f}", DISAGREEMENT
     ),
     "difference_polygons_fine": Signal(
-        0, "polygons let {value:+.0%} more light through than small voxels", DISAGREEMENT
+        0, "light below polygons differs from that below small voxels by {value:+.0%}", DISAGREEMENT
     ),
     "r_surfels_fine": Signal(
         -1,
@@ -169,7 +169,7 @@ SIGNALS = {
     ),
     "difference_surfels_fine": Signal(
         0,
-        "surfels let {value:+.0%} more light through than small voxels",
+        "light below surfels differs from that below small voxels by {value:+.0%}",
         DISAGREEMENT,
         only_of="surfels",
     ),
@@ -177,7 +177,9 @@ SIGNALS = {
         -1, "light of small and large voxels correlates with {value:.2f}", DISAGREEMENT
     ),
     "difference_fine_coarse": Signal(
-        0, "small voxels let {value:+.0%} more light through than large ones", DISAGREEMENT
+        0,
+        "light below small voxels differs from that below large ones by {value:+.0%}",
+        DISAGREEMENT,
     ),
     "sensitivity_polygons": Signal(
         1, "moved sensors change light by {value:.2f} of its spread (polygons)", PLACES

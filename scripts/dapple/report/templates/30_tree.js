@@ -5,7 +5,7 @@ charts.tree = (figure, data) => {
   const controls = figure.querySelector(".controls");
   const told = figure.querySelector(".told");
   const state = { shown: data.first, leaves: true, wood: true, sensors: true, ground: null };
-  const eye = { x: 0.8, y: -1.1, z: 0.4 };
+  const eye = { x: 0.95, y: -1.3, z: 0.47 };
 
   function triangles(corners, colour, name) {
     const [x, y, z] = places(corners);
@@ -70,7 +70,7 @@ charts.tree = (figure, data) => {
   function redraw() {
     const axis = (title) => ({ title: { text: title }, showbackground: false, gridcolor: "#ddd" });
     const scene = {
-      aspectmode: "data", camera: { eye: { ...eye }, center: { x: 0, y: 0, z: -0.12 } },
+      aspectmode: "data", camera: { eye: { ...eye }, center: { x: 0, y: 0, z: -0.16 } },
       xaxis: axis("east [m]"), yaxis: axis("north [m]"), zaxis: axis("up [m]"),
       uirevision: "turned",
     };
