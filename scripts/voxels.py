@@ -2,7 +2,6 @@
 
 from dapple import steps
 from dapple.formats import clouds, shots, voxel_grids
-from dapple.progress import followed
 from dapple.structure import subvoxel_clumping
 from dapple.workflow import options, run
 
@@ -13,21 +12,21 @@ def main(snakemake):
     correction = settings.pop("correction")
     settings["kinds"] = steps.return_kinds(cloud, settings.pop("majority_voxel_m"))
     size_m = float(snakemake.wildcards.size)
-    n_shots = shots.read_head(path)["n_shots"]
-    fired = followed(shots.iterate(path), "shots through voxels", n_shots, size=len)
+    fired = shots.Stored(path, "shots through voxels")
     density = steps.voxels(fired, cloud, size_m, **settings)
     if correction:
         finer_m = correction.pop("finer_m")
         density = subvoxel_clumping.correct(
             density,
-            steps.voxels(shots.iterate(path), cloud, finer_m, **settings) if finer_m else None,
+            steps.voxels(fired, cloud, finer_m, **settings) if finer_m else None,
             shots.read(path),
             kinds=settings["kinds"],
             **correction,
         )
     unknown = float(density["plant_area_density_m2_m3"].isnull().mean())
     print(
-        f"{n_shots:,} shots, {density['flag'].size:,} voxels of {size_m:g} m, {unknown:.1%} unknown"
+        f"{density.attrs['total_shots']:,} shots, {density['flag'].size:,} voxels of {size_m:g} m, "
+        f"{unknown:.1%} unknown"
     )
     voxel_grids.write(snakemake.output.voxels, density)
     voxel_grids.write_vox(snakemake.output.amapvox, density)

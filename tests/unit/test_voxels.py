@@ -398,6 +398,19 @@ def test_neither_threads_nor_memory_for_chunks_change_a_byte(threads):
         assert together[name].to_numpy().tobytes() == alone[name].to_numpy().tobytes(), name
 
 
+def test_chunks_that_come_once_tell_as_much_as_chunks_that_are_read_twice():
+    rng = np.random.default_rng(2)
+    shots = turbid(0.6, lambda z: np.full(len(z), 0.5), 2_000, rng)
+    # Returns on facets and corners of voxels belong to one side as much as to the other.
+    on_corner = shots_of([0.0, 0.0, -2.5], [0, 0, 1], [[0.7], [1.1], [2.5, 2.9], []])
+    grid = Grid(np.full(3, -2.0), (10, 10, 10), 0.4)
+    for size_m in (0.1, 0.08, 0.4):
+        twice = plant_area_density([shots, on_corner], grid, contact_voxel_m=size_m)
+        once = plant_area_density(iter([shots, on_corner]), grid, contact_voxel_m=size_m)
+        for name in twice.data_vars:
+            assert once[name].to_numpy().tobytes() == twice[name].to_numpy().tobytes(), name
+
+
 def test_chunks_add_up():
     ranges = [[1.2, 1.9], [], [1.4], [2.7], []]
     whole = shots_of([0.5, 0.5, -1], [0, 0, 1], ranges)

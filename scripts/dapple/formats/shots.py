@@ -13,6 +13,7 @@ from pyarrow import parquet
 from dapple.errors import InputError
 from dapple.formats.atomic import atomic
 from dapple.formats.clouds import Cloud
+from dapple.progress import followed
 
 SHOT_COLUMNS = ("scan", "dx", "dy", "dz")
 OFFSET_COLUMNS = ("ox", "oy", "oz")
@@ -265,6 +266,17 @@ def iterate(path: str | Path, chunk_shots: int = ROW_GROUP_SHOTS) -> Iterator[Sh
         head = _head(path, file)
         for batch in file.iter_batches(batch_size=chunk_shots, use_threads=False):
             yield _shots(batch, head)
+
+
+@dataclass(frozen=True)
+class Stored:
+    """Shots of a file to go through more than once; `what` is done is said now and then."""
+
+    path: str | Path
+    what: str
+
+    def __iter__(self) -> Iterator[Shots]:
+        return followed(iterate(self.path), self.what, read_head(self.path)["n_shots"], size=len)
 
 
 def read_head(path: str | Path) -> dict:

@@ -112,42 +112,57 @@ def _start_parts(
 
 @njit(cache=True)
 def _visit_parts(
-    voxel, part, distance, leave, stop, near, fine, step, move, range_m, kind, first, last,
+    voxel, part, n_all, distance, leave, stop, near, fine, step, move, range_m, kind, first, last,
     touched, hit,
 ):  # fmt: skip
     """Mark the parts of one voxel that a beam visits from `distance` to `stop` or `leave`.
 
     Returns the part it is in at the end, and how many it visited.
     """
+    # In registers: this loop runs several times for each voxel on the way of each beam.
     tx, ty, tz = fine[0], fine[1], fine[2]
-    visits, j = 0, first
+    step_x, step_y, step_z = step[0], step[1], step[2]
+    move_x, move_y, move_z = move[0], move[1], move[2]
+    end, next_m = leave - near, math.inf
+    if first < last:
+        next_m = range_m[first]
+    visits, j, word, bits = 0, first, 0, np.uint64(0)
     while True:
-        facet = min(tx, ty, tz, leave)
-        if facet - distance > near and 0 <= part < touched.shape[1]:
-            visits += 1
-            if touched[voxel, part] == 0:
-                touched[voxel, part] = 1
-            while j < last and (range_m[j] < facet or facet >= leave - near):
-                if kind[j] == HIT:
-                    hit[voxel, part] = 1
-                j += 1
-            distance = facet
-        if facet >= leave - near or distance >= stop:
-            fine[0], fine[1], fine[2] = tx, ty, tz
-            return part, visits
         # Which facet comes next is hard to foresee: choose without branches.
         on_x = (tx <= ty) & (tx <= tz)
         on_y = (not on_x) & (ty <= tz)
-        part += move[0] if on_x else (move[1] if on_y else move[2])
-        tx += step[0] if on_x else 0.0
-        ty += step[1] if on_y else 0.0
-        tz += 0.0 if on_x | on_y else step[2]
+        facet = tx if on_x else (ty if on_y else tz)
+        is_last = facet >= end
+        facet = leave if is_last else facet
+        own = part >> 6
+        if facet - distance > near and 0 <= part < n_all:
+            visits += 1
+            if own != word:
+                touched[voxel, word] |= bits
+                word, bits = own, np.uint64(0)
+            bits |= np.uint64(1) << np.uint64(part & 63)
+            if next_m < facet or (is_last and first < last):
+                while j < last and (range_m[j] < facet or is_last):
+                    if kind[j] == HIT:
+                        hit[voxel, own] |= np.uint64(1) << np.uint64(part & 63)
+                    j += 1
+                next_m = range_m[j] if j < last else math.inf
+            distance = facet
+        if is_last or distance >= stop:
+            touched[voxel, word] |= bits
+            fine[0], fine[1], fine[2] = tx, ty, tz
+            return part, visits
+        part += move_x if on_x else (move_y if on_y else move_z)
+        tx += step_x if on_x else 0.0
+        ty += step_y if on_y else 0.0
+        tz += 0.0 if on_x | on_y else step_z
 
 
 @njit(cache=True)
 def _march(
     i, origin, direction, zenith, g, first, range_m, kind, corner, shape, size, beam, element,
-    u_max, n_parts, visits, hits, touched, hit, inverse, facet, fine, step, index, place, move,
+    u_max, n_parts, has_parts, visits, hits, touched, hit, inverse, facet, fine, step, index,
+    place, move,
 ):  # fmt: skip
     """Follow shot i until it leaves the grid or its last echo has taken the rest of the beam."""
     o, d = origin[i], direction[i]
@@ -160,11 +175,7 @@ def _march(
     if not distance < far or (j == end and not is_miss):
         return
     start_march(o, d, corner, shape, size, distance, inverse, index, facet)
-    part, near = 0, 1e-9 * size
-    if n_parts > 0:
-        part = _start_parts(
-            o, d, corner, size, n_parts, distance, inverse, index, place, fine, step, move
-        )
+    part, near = -1, 1e-9 * size
     while True:
         k = nearest_facet(facet)
         leave = facet[k]
@@ -196,21 +207,28 @@ def _march(
                 visits[voxel, FREE] += passing * g * _effective(chord, g * element)
             if whole > 1e-12 * section:
                 _add_moments(visits, voxel, VISIT_MOMENTS, whole, t)
-            if n_parts > 0:
+            if has_parts[voxel]:
+                if part < 0:
+                    part = _start_parts(
+                        o, d, corner, size, n_parts, distance, inverse, index, place, fine, step,
+                        move,
+                    )  # fmt: skip
                 stop = range_m[end - 1] if is_over else leave
                 part, number = _visit_parts(
-                    voxel, part, distance, leave, stop, near, fine, step, move, range_m, kind,
-                    from_j, j, touched, hit,
+                    voxel, part, n_parts**3, distance, leave, stop, near, fine, step, move, range_m,
+                    kind, from_j, j, touched, hit,
                 )  # fmt: skip
                 visits[voxel, PARTS] += number
                 visits[voxel, PART_FACTOR] += number * math.cos(zenith) / g
+            else:
+                part = -1
             if is_over:
                 return
         distance = max(distance, leave)
         index[k] += 1 if inverse[k] > 0.0 else -1
         if index[k] < 0 or index[k] >= shape[k]:
             return
-        if n_parts > 0:  # from the last part of one voxel to the first of the next
+        if part >= 0:  # from the last part of one voxel to the first of the next
             part -= (n_parts - 1) * move[k]
             fine[k] = leave + step[k]
         facet[k] = next_facet(o, inverse, corner, size, index[k], k)
@@ -219,7 +237,7 @@ def _march(
 @njit(cache=True, parallel=True)
 def accumulate(
     origin, direction, zenith, g, first, range_m, kind, corner, shape, size, beam, element,
-    u_max, n_parts, visits, hits, touched, hit,
+    u_max, n_parts, has_parts, visits, hits, touched, hit,
 ):  # fmt: skip
     """Add shots to the sums of the voxels that they cross.
 
@@ -246,11 +264,13 @@ def accumulate(
         Longest optical path G·δ in a voxel [m]; moments are of t = 2·G·δ/u_max - 1.
     n_parts : int
         Sub-voxels along an edge, for the contact frequency; 0: none.
+    has_parts : (voxels,) bool
+        Where sub-voxels are of interest: most of the way of most beams leads through empty voxels.
     visits, hits : (blocks, voxels, columns) float64
         Sums, added to. Blocks take turns of shots: a fixed number of them, whatever the number of
         threads, so that sums do not depend on it.
-    touched, hit : (voxels, n_parts³) uint8
-        Set to 1 where a beam, or a leaf hit, was in the sub-voxel.
+    touched, hit : (blocks, voxels, words) uint64
+        A bit of each sub-voxel, set where a beam, or a leaf hit, was in it.
     """
     n_blocks, n_shots = len(visits), len(direction)
     for block in prange(n_blocks):
@@ -260,6 +280,6 @@ def accumulate(
             for i in range(begin, min(begin + _SEGMENT, n_shots)):
                 _march(
                     i, origin, direction, zenith[i], g[i], first, range_m, kind, corner, shape,
-                    size, beam, element, u_max, n_parts, visits[block], hits[block], touched, hit,
-                    inverse, facet, fine, step, index, place, move,
+                    size, beam, element, u_max, n_parts, has_parts, visits[block], hits[block],
+                    touched[block], hit[block], inverse, facet, fine, step, index, place, move,
                 )  # fmt: skip

@@ -1,7 +1,7 @@
 """What shots tell about each voxel of a grid that they are followed through, added up."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,9 @@ from dapple.errors import InputError
 from dapple.formats.shots import Shots
 from dapple.structure import estimators, leaf_angles, returns, traversal
 from dapple.structure.returns import Kinds
+
+_ROUNDING = 1e-6
+"""Share of a voxel by which places of returns and distances along beams may differ."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,7 @@ class Sums:
     visits, hits : (v, columns) float64
         Of everything that entered, and of leaf hits.
     n_hit_parts, n_touched_parts : (v,) int64
-        Sub-voxels with a leaf hit, and with any beam.
+        Sub-voxels with a leaf hit, and, where there are such, with any beam.
     u_max : float
         Longest optical path in a voxel [m].
     max_pad_m2_m3 : float
@@ -110,7 +113,8 @@ def accumulate(
     Parameters
     ----------
     chunks : Shots or iterable of Shots
-        Taken one at a time, once.
+        Taken one at a time, and twice for the contact frequency: the first time for where returns
+        are. An iterator, which gives its chunks once, takes longer for the same sums.
     grid : Grid
     kinds : callable, (m,) uint8 or None
         What each return is: 0 leaf, 1 wood, 2 noise. A function of a chunk, an array for the
@@ -159,7 +163,10 @@ def accumulate(
     n_blocks = 4 if grid.n_voxels <= 200_000 else 2
     visits = np.zeros((n_blocks, grid.n_voxels, traversal.VISIT_MOMENTS + count))
     hits = np.zeros((n_blocks, grid.n_voxels, traversal.HIT_MOMENTS + count))
-    touched, hit = np.zeros((2, grid.n_voxels, n_parts**3), np.uint8)
+    touched, hit = np.zeros((2, n_blocks, grid.n_voxels, -(-(n_parts**3) // 64)), np.uint64)
+    has_parts = np.full(grid.n_voxels, n_parts > 0)
+    if n_parts and not isinstance(chunks, Iterator):
+        has_parts = _with_returns(chunks, grid)
     beam = np.array([math.tan(beam_divergence_mrad / 2000), beam_diameter_m])
     n_shots = n_misses = n_returns = 0
     scans: set[int] = set()
@@ -183,6 +190,7 @@ def accumulate(
             part_of_leaf(single_leaf_area_m2, grid.size_m) / grid.size_m**3,
             u_max,
             n_parts,
+            has_parts,
             visits,
             hits,
             touched,
@@ -197,6 +205,10 @@ def accumulate(
     for block in range(1, n_blocks):
         visits[0] += visits[block]
         hits[0] += hits[block]
+        touched[0] |= touched[block]
+        hit[0] |= hit[block]
+    n_hit = np.bitwise_count(hit[0]).sum(axis=1, dtype=np.int64)
+    n_touched = np.bitwise_count(touched[0]).sum(axis=1, dtype=np.int64)
     settings = {
         "leaf_angle_distribution": leaf_angle_distribution,
         "single_leaf_area_m2": single_leaf_area_m2,
@@ -209,8 +221,8 @@ def accumulate(
         grid,
         visits[0],
         hits[0],
-        hit.sum(axis=1, dtype=np.int64),
-        touched.sum(axis=1, dtype=np.int64),
+        n_hit,
+        np.where(n_hit > 0, n_touched, 0),
         u_max,
         max_pad_m2_m3,
         n_shots,
@@ -235,6 +247,19 @@ def part_of_leaf(leaf_area_m2: float, size_m: float) -> float:
     return leaf_area_m2 * (
         1 - 1.5 * mean * x + 2 / math.pi * x**2 - mean_of_cubes / (4 * math.pi) * x**3
     )
+
+
+def _with_returns(chunks: Shots | Iterable[Shots], grid: Grid) -> np.ndarray:
+    """(v,) bool, voxels with a return in them or, but for rounding, on their facets."""
+    found = np.zeros(grid.n_voxels, bool)
+    for chunk in [chunks] if isinstance(chunks, Shots) else chunks:
+        place = (chunk.return_xyz_m - grid.corner_m) / grid.size_m
+        on_facet = (np.abs(place - np.round(place)) < _ROUNDING).any(axis=1)
+        beside = _ROUNDING * (2 * np.argwhere(np.ones((2, 2, 2))) - 1)
+        for some in (place, *(place[on_facet] + one for one in beside)):
+            inside = ((some >= 0) & (some < grid.shape)).all(axis=1)
+            found[np.ravel_multi_index(tuple(some[inside].astype(np.int64).T), grid.shape)] = True
+    return found
 
 
 def _largest_projection(distribution: str) -> float:
