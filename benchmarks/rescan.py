@@ -7,6 +7,8 @@ and voxels with several settings. Each reconstruction predicts the shots from th
 the share of the sun's disc that sensors see under it is compared with that under the true tree
 (docs/data/rescan.csv). Spearman's rank correlation of the error of light with each score, over the
 reconstructions of a tree and over all, stands in docs/data/rescan_ranks.csv: 1 is a perfect judge.
+By how much the setting that a score would choose errs more than the best one of the same tree and
+kind, `any` being the best of all kinds, stands in docs/data/rescan_choices.csv.
 """
 
 import argparse
@@ -41,6 +43,8 @@ LEFT_OUT = 2
 """Number of the position that is predicted."""
 SCORES = {"right_share": -1, "hit_or_pass_share": -1, "gap_rmse": 1, "range_near_share": -1}
 """What may rank; -1 where more is better."""
+NEAR_BEST = 0.1
+"""A choice is good whose error of light is at most so much above the least."""
 
 
 def main() -> None:
@@ -67,7 +71,33 @@ def main() -> None:
     folder = options.docs / "data"
     table.to_csv(folder / "rescan.csv", index=False, float_format="%.4g")
     pd.DataFrame(ranks).to_csv(folder / "rescan_ranks.csv", index=False, float_format="%.3g")
-    print(pd.DataFrame(ranks).to_string())
+    chosen = choices(table)
+    chosen.to_csv(folder / "rescan_choices.csv", index=False, float_format="%.3g")
+    print(pd.DataFrame(ranks).to_string(), chosen.to_string(), sep="\n")
+
+
+def choices(table: pd.DataFrame) -> pd.DataFrame:
+    """What each score would choose, of every kind of reconstruction and of all, over the trees."""
+    kinds = [*table.groupby("reconstruction"), ("any", table)]
+    rows = []
+    for kind, of_kind in kinds:
+        trees = [own for _, own in of_kind.groupby("tree")]
+        for score, sign in SCORES.items():
+            picked = [own.loc[(sign * own[score]).idxmin(), "rmse"] for own in trees]
+            above = [rmse / own["rmse"].min() - 1 for rmse, own in zip(picked, trees, strict=True)]
+            rows.append(
+                {
+                    "reconstruction": kind,
+                    "score": score,
+                    "trees": len(trees),
+                    "near_best": sum(one <= NEAR_BEST for one in above),
+                    "worst_above_best": max(above),
+                    "worst_setting_above_best": max(
+                        own["rmse"].max() / own["rmse"].min() - 1 for own in trees
+                    ),
+                }
+            )
+    return pd.DataFrame(rows)
 
 
 def rescanned(settings: Settings) -> Iterator[dict[str, Any]]:
