@@ -7,23 +7,22 @@ from pathlib import Path
 
 import pandas as pd
 
-SHOWN = ("polygons", "voxels_0.2", "voxels_1.0")
-CORRECTED = {f"{name}_corrected": name for name in SHOWN}
+SHOWN = ("surfels", "polygons", "voxels_0.2", "voxels_1.0")
+CORRECTED = {f"{name}_corrected": name for name in SHOWN if name != "surfels"}
 COLUMNS = [
     "stressor", "level", "label", "harmless", "reconstruction", "seed", "r", "rmse_rel", "bias_rel",
     "mean_par_rel", "leaf_area_m2", "leaf_area_bias", "f1_leaf", "f1_wood", "flagged", "wall_s",
     "failed",
 ]  # fmt: skip
 PLAIN = [
-    ("nothing", "scan_positions", ["8"], "polygons"),
+    ("nothing", "scan_positions", ["8"], "surfels"),
     ("two scan positions, one", "scan_positions", ["2", "1"], "voxels from two positions down"),
     ("all positions at one place", "scan_side", ["0"], "voxels, or move the scanner"),
     ("shots 0.2°, 0.5° apart (usual 0.08°)", "angular_step", ["0.2", "0.5"],
-     "voxels, or corrected polygons"),
+     "surfels to 0.2°, then voxels"),
     ("shots 0.02°, 0.04° apart", "angular_step", ["0.02", "0.04"],
-     "polygons; a finer scan gains nothing"),
-    ("a tenth, a hundredth of the shots", "few_shots", ["0.1", "0.01"],
-     "voxels, or corrected polygons"),
+     "surfels; a finer scan gains a little"),
+    ("a tenth, a hundredth of the shots", "few_shots", ["0.1", "0.01"], "voxels"),
     ("3 in 1000 shots", "few_shots", ["0.003"], "voxels of 1 m"),
     ("scans 5 cm, 10 cm out of register", "misregistration", ["0.05", "0.1"],
      "register again, or voxels"),
@@ -33,13 +32,14 @@ PLAIN = [
      "survey the sensors, or coarse voxels"),
     ("the clock 5 min, 10 min ahead", "clock_offset", ["5", "10"], "fit the clock"),
     ("voxels a quarter as large (polygons 1.25 cm, voxels 5 cm and 25 cm)",
-     "voxel_to_leaf_size", ["0.25"], "corrected reconstructions"),
+     "voxel_to_leaf_size", ["0.25"], "surfels, whose size follows the points"),
     ("voxels four times as large (20 cm, 80 cm, 4 m)", "voxel_to_leaf_size", ["4"],
-     "the usual sizes"),
-    ("needles 1 mm wide", "leaf_size", ["needles 1 mm"], "voxels"),
-    ("leaves of 15 cm", "leaf_size", ["15 cm"], "polygons"),
-    ("four times the leaf area", "leaf_area", ["4"], "polygons"),
-    ("density cap of 0.5 m² m⁻³", "pad_cap", ["0.5"], "raise the cap; polygons have none"),
+     "surfels, whose size follows the points"),
+    ("needles 1 mm wide", "leaf_size", ["needles 1 mm"], "voxels or surfels"),
+    ("leaves of 15 cm", "leaf_size", ["15 cm"], "surfels or polygons"),
+    ("four times the leaf area", "leaf_area", ["4"], "surfels"),
+    ("density cap of 0.5 m² m⁻³", "pad_cap", ["0.5"],
+     "raise the cap; surfels and polygons have none"),
 ]  # fmt: skip
 """What goes wrong in plain words: stressor, labels of its levels, and what to use."""
 
@@ -53,6 +53,7 @@ def tables(folder: Path) -> dict[str, pd.DataFrame]:
         "stability_thresholds": pd.read_csv(found / "thresholds.csv"),
         "stability_medians": medians(points),
         "stability_plain": plain(points),
+        "stability_surfels_lost": surfels_lost(points),
         "corrections": corrections(points),
         "verdict": pd.read_csv(found / "verdict.csv"),
     }
@@ -79,6 +80,25 @@ def plain(points: pd.DataFrame) -> pd.DataFrame:
         of_method = {name.replace(".", ""): ", ".join(texts) for name, texts in cells.items()}
         rows.append({"trouble": trouble} | of_method | {"use": use})
     return pd.DataFrame(rows)
+
+
+def surfels_lost(points: pd.DataFrame) -> pd.DataFrame:
+    """Levels at which another reconstruction has a smaller median RMSE than surfels.
+
+    With the share of the worlds in which the verdict, fitted without them, warns of surfels.
+    """
+    key = ["stressor", "label"]
+    table = medians(points).set_index(["reconstruction", *key])[["r", "rmse_rel"]]
+    wide = pd.concat(
+        {name.replace(".", ""): table.loc[name] for name in SHOWN}, axis=1, names=["method"]
+    )
+    wide.columns = [f"{value}_{method}" for method, value in wide.columns]
+    errors = wide[[f"rmse_rel_{name.replace('.', '')}" for name in SHOWN]]
+    wide["best"] = [SHOWN[place] for place in errors.to_numpy().argmin(axis=1)]
+    own = points[points["reconstruction"] == "surfels"].groupby(key)
+    wide["warned"] = own["flagged"].mean()
+    wide["warned_scan"] = own["flagged_scan"].mean()
+    return wide[wide["best"] != "surfels"].reset_index()
 
 
 def corrections(points: pd.DataFrame) -> pd.DataFrame:

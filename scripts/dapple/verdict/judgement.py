@@ -123,10 +123,8 @@ def _reason(share: float, name: str, value: float, learned: dict) -> dict:
 
 
 def load(path: Path = MODEL, *, with_records: bool = False) -> dict[str, dict]:
-    """The stored models by reconstruction; that of polygons stands in for surfels without one."""
-    models = json.read(path)["records" if with_records else "scan"]["models"]
-    # Both are sharp surfaces of the same points, with the same shadows to miss.
-    return {"surfels": models["polygons"]} | models if "polygons" in models else models
+    """The stored models by reconstruction."""
+    return json.read(path)["records" if with_records else "scan"]["models"]
 
 
 def store(path: Path, points: pd.DataFrame, **settings: Any) -> dict:
