@@ -19,6 +19,8 @@ import stability_tables
 import yaml
 
 DATA = Path(__file__).parents[1] / "docs" / "data"
+CENTRE_M = slice(5, 10)
+"""Of a stand 15 m wide, in cells of 1 m."""
 
 
 def survey_small(folder: Path) -> dict[str, pd.DataFrame]:
@@ -38,18 +40,41 @@ def survey(folder: Path) -> dict[str, pd.DataFrame]:
         "correction": ["factors_from", "quantity", "design"],
         "plan": ["n_scans", "planner"],
     }
-    found = {}
-    for name, table in tables.items():
-        means = table.drop(columns="seed", errors="ignore").groupby(
-            ["stand", *keys[name]], sort=False
-        )
-        wide = means.mean(numeric_only=True).unstack("stand")
-        wide.columns = ["_".join(names) for names in wide.columns]
-        found[f"survey_{name}"] = wide.reset_index()
+    found = {f"survey_{name}": by_species(table, keys[name]) for name, table in tables.items()}
     variants = pd.read_csv(folder / "survey" / "variants.csv")
     first = ["design", "n_beams", "stand", "variant"]
     found["survey_variants"] = variants[[*first, *variants.columns.difference(first, sort=False)]]
+    estimators = pd.read_csv(folder / "survey" / "estimators.csv")
+    found["survey_estimators"] = by_species(estimators, ["design", "estimator", "cells"])
+    found["survey_centre"] = of_centre(folder / "survey" / "shadow_maps.npz")
     return found | of_five_scans(found["survey_shadowing"])
+
+
+def single_scan(folder: Path) -> dict[str, pd.DataFrame]:
+    """What one real scan reached."""
+    facts = json.loads((folder / "survey" / "coverage.json").read_text())
+    return {"survey_real_scan": pd.DataFrame([{"scan": folder.name, **facts}])}
+
+
+def by_species(table: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
+    """Means over the stands of a species, with a column for each species."""
+    means = table.drop(columns="seed", errors="ignore").groupby(["stand", *keys], sort=False)
+    wide = means.mean(numeric_only=True).unstack("stand")
+    wide.columns = ["_".join(names) for names in wide.columns]
+    return wide.reset_index()
+
+
+def of_centre(path: Path) -> pd.DataFrame:
+    """Shadow of the 5 x 5 m in the middle, by third of the height, counted from below."""
+    rows: dict[tuple[str, int], dict[str, float]] = {}
+    with np.load(path) as maps:
+        for key in maps.files:
+            species, design, third = key.split("/")
+            centre = maps[key][CENTRE_M, CENTRE_M]
+            rows.setdefault((design, int(third) + 1), {})[species] = float(np.nanmean(centre))
+    return pd.DataFrame(
+        [{"design": name, "third": third} | shares for (name, third), shares in rows.items()]
+    )
 
 
 def of_five_scans(shadowing: pd.DataFrame) -> dict[str, pd.DataFrame]:
@@ -182,6 +207,7 @@ REAL_RUNS = ("apple", "leafy-tree", "single-scan", "pine-plot")
 RUNS: dict[str, Callable[[Path], dict[str, pd.DataFrame]]] = {
     "survey-small": survey_small,
     "survey": survey,
+    "single-scan": single_scan,
     "virtual-apple": virtual_apple,
     "apple": apple,
     "stability": stability_tables.tables,
