@@ -1,7 +1,9 @@
 """Do intervals of plant area hold the truth in as many cases as they say?
 
     python benchmarks/plant_area.py learn         constants of structure/plant_area.py, on 40 crowns
-    python benchmarks/plant_area.py judge         docs/data/plant_area*.csv, on 60 others
+    python benchmarks/plant_area.py judge         docs/data/plant_area{,_crowns}.csv, on 60 others
+    python benchmarks/plant_area.py sizes         docs/data/plant_area_sizes.csv, on those of the 40
+                                                  that at least four positions scanned
 
 Crowns are discs in a ball, evenly or in clumps, scanned from one to eight places with beams that
 have no width. The true area of a voxel is that of the parts of discs that lie in it. Ten of the
@@ -10,6 +12,7 @@ judged crowns are scanned once more with beams as wide as a scanner's: no interv
 
 import argparse
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +23,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "scripts"))
 
 from dapple.formats import meshes  # noqa: E402
+from dapple.formats.shots import Shots  # noqa: E402
 from dapple.structure import plant_area  # noqa: E402
 from dapple.structure.voxel_sums import Grid  # noqa: E402
 from dapple.structure.voxels import plant_area_density  # noqa: E402
@@ -29,6 +33,10 @@ LEARNED, JUDGED = range(40), range(2000, 2060)
 WIDE = range(2000, 2010)
 SIZE_M, FILL_RANGE_M, MOST_DISCS, PARTS = 0.2, 0.5, 12_000, 48
 CLUMP_DISCS, CLUMP_M = 20, 0.08
+SIZES_M, MOST_DENSITY = (0.2, 0.1), 4.0
+"""Sizes that are compared, and the cap of density times size [m² m⁻²]."""
+ENOUGH_SHOTS = 30
+"""Median over voxels that are entered at all, below which they are too small for a scan."""
 
 
 def crown(rng: np.random.Generator) -> tuple[np.ndarray, float]:
@@ -73,8 +81,8 @@ def area_by_voxel(discs: np.ndarray, voxels: xr.Dataset) -> np.ndarray:
     return np.bincount(flat, area, int(np.prod(shape))).reshape(shape)
 
 
-def scanned(seed: int, *, is_wide: bool = False) -> tuple[xr.Dataset, np.ndarray, float, int]:
-    """Voxels of a crown, their true areas, area of an element [m²] and number of positions."""
+def fired(seed: int, *, is_wide: bool = False) -> tuple[Shots, np.ndarray, float, int]:
+    """Shots at a crown, its discs, area of an element [m²] and number of positions."""
     rng = np.random.default_rng(seed)
     discs, element_m2 = crown(rng)
     positions = int(rng.choice([1, 2, 3, 4, 6, 8]))
@@ -88,10 +96,65 @@ def scanned(seed: int, *, is_wide: bool = False) -> tuple[xr.Dataset, np.ndarray
         seed=seed,
         **beam,
     )
-    bounds_m = np.array([mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)])
-    grid = Grid.around(bounds_m, SIZE_M)
+    return shots, discs, element_m2, positions
+
+
+def bounds_m(discs: np.ndarray) -> np.ndarray:
+    """Lowest and highest corner of all discs, (2, 3)."""
+    vertices_m = meshes.of_discs(discs).vertices_m
+    return np.array([vertices_m.min(axis=0), vertices_m.max(axis=0)])
+
+
+def scanned(seed: int, *, is_wide: bool = False) -> tuple[xr.Dataset, np.ndarray, float, int]:
+    """Voxels of a crown, their true areas, area of an element [m²] and number of positions."""
+    shots, discs, element_m2, positions = fired(seed, is_wide=is_wide)
+    grid = Grid.around(bounds_m(discs), SIZE_M)
     voxels = plant_area_density(shots, grid, contact_voxel_m=0, max_pad_m2_m3=20.0)
     return voxels, area_by_voxel(discs, voxels), element_m2, positions
+
+
+def by_size(seed: int) -> Iterator[dict[str, float | bool]]:
+    """Relative error of a crown's area by voxels of several sizes, with and without leaf area."""
+    shots, discs, element_m2, positions = fired(seed)
+    true_m2 = float((np.pi * discs[:, 0] ** 2).sum())
+    for size_m in SIZES_M:
+        grid = Grid.around(bounds_m(discs), size_m)
+        for leaf_m2 in (0.0, element_m2):
+            voxels = plant_area_density(
+                shots,
+                grid,
+                contact_voxel_m=0,
+                max_pad_m2_m3=MOST_DENSITY / size_m,
+                single_leaf_area_m2=leaf_m2,
+            )
+            number = voxels["n_shots"].to_numpy()
+            yield {
+                "crown": seed,
+                "positions": positions,
+                "size_m": size_m,
+                "has_leaf_area": leaf_m2 > 0,
+                "median_shots": float(np.median(number[number > 0])),
+                "error": float(np.nansum(voxels["pad_fpl_m2_m3"]) * size_m**3 / true_m2 - 1),
+            }
+
+
+def positions_of(seed: int) -> int:
+    """Number of scan positions of a crown."""
+    rng = np.random.default_rng(seed)
+    crown(rng)
+    return int(rng.choice([1, 2, 3, 4, 6, 8]))
+
+
+def of_sizes(rows: pd.DataFrame) -> pd.DataFrame:
+    """Errors over crowns whose smallest voxels enough shots entered, by size and leaf area."""
+    rows = rows[rows.groupby("crown")["median_shots"].transform("min") >= ENOUGH_SHOTS]
+    found = rows.groupby(["size_m", "has_leaf_area"], sort=False)["error"]
+    return found.agg(
+        crowns="size",
+        mean="mean",
+        mean_absolute=lambda error: error.abs().mean(),
+        within_3_percent=lambda error: (error.abs() <= 0.03).mean(),
+    ).reset_index()
 
 
 def compared(seed: int, *, is_wide: bool = False) -> pd.DataFrame:
@@ -157,9 +220,15 @@ def coverage(rows: pd.DataFrame) -> pd.DataFrame:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=("learn", "judge"))
+    parser.add_argument("what", choices=("learn", "judge", "sizes"))
     parser.add_argument("--docs", type=Path, default=ROOT / "docs")
     options = parser.parse_args()
+    if options.what == "sizes":
+        many = [seed for seed in LEARNED if positions_of(seed) >= 4]
+        sizes = of_sizes(pd.DataFrame([row for seed in many for row in by_size(seed)]))
+        sizes.to_csv(options.docs / "data/plant_area_sizes.csv", index=False, float_format="%.4g")
+        print(sizes.to_string())
+        return
     seeds = LEARNED if options.what == "learn" else JUDGED
     rows = [compared(seed) for seed in seeds]
     if options.what == "judge":
