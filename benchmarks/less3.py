@@ -44,6 +44,8 @@ from dapple.sky.sky_radiance import isotropic  # noqa: E402
 from dapple.workflow import evenly  # noqa: E402
 
 REPEATS = 2
+SAMPLES = {"voxels_1.0": (4, 2), "voxels_0.2": (2, 1)}
+"""Sensors and times of LESS in turbid voxels, where it is slow."""
 PLATE_M = 0.03
 """Diameter of the sensors, as published."""
 SETTINGS = Settings(experiment="less").light
@@ -199,7 +201,7 @@ def main() -> None:
         leaves = folder / f"structure/{name}" / ("voxels.nc" if turbid else "leaves_0.ply")
         wood = folder / f"structure/{'truth' if name == 'truth' else 'polygons'}/wood.ply"
         scene = scene_files.read([str(leaves)], str(wood))[0]
-        n = (4, 2) if turbid else (options.sensors, options.times)
+        n = SAMPLES.get(name, (options.sensors, options.times))
         even = isotropic(sky)
         dark = even.assign(beam_normal_umol_m2_s=0.0 * even["beam_normal_umol_m2_s"])
         for kind, above in {"as given": sky, "isotropic": even, "no sun": dark}.items():

@@ -93,6 +93,7 @@ if LIT:
             **sized(settings.tradeoff),
             ground=GROUND,
             shade=SHADE,
+            runner=beside_code("light/less_run.py") if BY_LESS else [],
             code=code("tradeoff_points"),
         output:
             points=results("tradeoff/points.csv"),
@@ -106,7 +107,7 @@ if LIT:
         resources:
             mem_mb=memory(4000),
         params:
-            **settings.tradeoff.model_dump(exclude={"max_orders"}),
+            **settings.tradeoff.model_dump(exclude={"max_orders", "less_rays"}),
             **PILOT,
             tracing=tracing(
                 "sun_kernel_deg", "sun_diameter_deg", "aperture_m", "response"
@@ -115,6 +116,8 @@ if LIT:
             polygon_size_m=settings.polygons.nominal_m,
             surfel_spacing_m=settings.surfels.spacing_m,
             timestep=REFERENCE,
+            less_rays=settings.tradeoff.less_rays if BY_LESS else [],
+            less=LESS_RAYS | {"bands": LESS.bands, "aperture_m": OF_BEAM["aperture_m"]},
             seed=stream("tradeoff"),
         message:
             said("error and cost of a grid of settings")

@@ -257,6 +257,7 @@ LESS_RAYS = {
     "max_orders": settings.light.transport.max_orders,
     "sun_diameter_deg": OF_BEAM["sun_diameter_deg"],
 }
+BY_LESS = "less" in (settings.light.engine, *CHECK_WITH)
 TRACING = settings.light.transport.model_dump() | OF_BEAM | {"response": RESPONSE}
 REFERENCE = OF_BEAM | {"variant": f"{VARIANT}_rgb", "response": RESPONSE}
 REFERENCE |= settings.light.timestep.model_dump(exclude={"step_min", "times_per_job"})

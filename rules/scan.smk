@@ -248,6 +248,11 @@ else:
         input:
             leaves=results(f"structure/{SCANNED}/leaves_0.ply"),
             wood=results(f"structure/{SCANNED}/wood.ply"),
+            runner=(
+                beside_code("virtual/less_scanner_run.py")
+                if settings.scan.program == "less"
+                else []
+            ),
             code=code("scan"),
         output:
             points=results("scan/points.laz"),

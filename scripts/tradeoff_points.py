@@ -25,6 +25,8 @@ def main(snakemake):
         max_orders=params.max_orders,
         timestep_rays=params.timestep_rays,
         timestep=params.timestep,
+        less_rays=params.less_rays,
+        less=params.less,
         tracing=Tracing(**params.tracing),
         repeats=params.repeats,
         variant=params.variant,

@@ -21,7 +21,7 @@ OF_LIBRARIES = {
     "CSF": "bSloopSmooth cloth_resolution class_threshold",
     "CloudCompare": "octreeLevel signedDistances",
     "laspy": "generating_software wkt",
-    "LESS 3": "surface_illumination illumination",
+    "LESS 3": "surface_illumination illumination generate_pulses scene_w scene_d",
     "rpy2": "consolewrite_warnerror consolewrite_print",
 }
 """What libraries call, or are told by setting it."""

@@ -10,10 +10,13 @@ import xarray as xr
 from tests.physics.test_timestep import disc, leaves, level, optics, rays, voxels
 
 from dapple import less3
+from dapple.advice.geometries import Geometry
+from dapple.advice.grid import Grid
 from dapple.errors import InputError
 from dapple.formats.netcdf import time_coordinate
 from dapple.light import less_engine, less_files
 from dapple.light.less_files import LessRays
+from dapple.light.light_model import Tracing
 from dapple.light.timestep_series import Reference
 from dapple.scene.surfaces import Scene, of_kinds
 from dapple.sky.sky_radiance import in_directions
@@ -197,3 +200,37 @@ def test_leaf_angles_that_less_does_not_know_are_an_error(tmp_path):
         less_files.write(
             tmp_path, Scene(voxels=grid), optics(), sky((30.0, 0.0)), sensors((0, 0, 0)), numbers
         )
+
+
+@WITH_LESS
+def test_the_trade_off_holds_less_to_the_same_sensors_and_times():
+    """More rays err less; under a plain tree both engines find the same light."""
+    scene = Scene(of_kinds(leaf=leaves(400, 0.1, (-1, -1, 0.5), (1, 1, 2), seed=1)))
+    table = sensors((0.0, 0.0, 0.1), (0.4, 0.2, 0.1))
+    options = {"bands": 3, "aperture_m": 0.03, "rays": 1, "suns": 4, "max_orders": 3}
+    grid = Grid(
+        table,
+        sky((30.0, 180.0), (50.0, 240.0)),
+        optics(),
+        paths=[256],
+        sky_patches=[145],
+        orders=[3],
+        max_orders=3,
+        timestep_rays=[],
+        timestep={},
+        tracing=Tracing(aperture_m=0.03, sun_diameter_deg=0.533, sun_kernel_deg=8.0),
+        less_rays=[64, 12800],
+        less=options | {"sun_diameter_deg": 0.533},
+        repeats=1,
+        variant="llvm_ad_mono",
+        seed=1,
+        truth=scene,
+    )
+    points = pd.DataFrame(grid.points([Geometry("polygons", 0.05, lambda: scene)], 0.05))
+    few, many = points[points["engine"] == "less"].to_dict("records")
+    assert (few["paths"], many["paths"]) == (64, 12800)
+    assert (few["n_sensors"], few["n_times"]) == (2, 2)
+    assert many["error_rel"] < few["error_rel"]
+    assert many["error_rel"] < 0.03  # four suns for a disc
+    # what the other process worked counts
+    assert min(few["cpu_s"], many["cpu_s"]) > 0.2

@@ -31,7 +31,7 @@ PACKAGES = {
 PROGRAMS = {
     "pdal.py": "pdal",
     "cloud/cloudcompare.py": "cloudcompare",
-    "light/less_engine.py": "less3d",
+    "less3.py": "less3d",
 }
 """Programs that modules of dapple run."""
 OPTIONAL = {"cloudComPy"}
@@ -82,7 +82,8 @@ def environment(name):
     entries = yaml.safe_load((ROOT / f"envs/{name}.yaml").read_text())["dependencies"]
     plain = [one for one in entries if isinstance(one, str)]
     plain += [one for pip in entries if isinstance(pip, dict) for one in pip["pip"]]
-    return dict(re.fullmatch(r"([\w.-]+)(?:={1,2}(.*))?", one).groups() for one in plain)
+    found = (re.fullmatch(r"([\w.-]+)(?:={1,2}([^;]*))?(?:;.*)?", one) for one in plain)
+    return dict(one.groups() for one in found)
 
 
 RULES = [

@@ -71,15 +71,18 @@ def test_the_page_is_one_file_that_asks_for_no_other(points):
     assert page == chart.page(points, "mine")
 
 
-def test_both_charts_say_that_published_times_are_another_machines(points):
-    note = chart.published_note(points)
-    assert "Another machine" in note
-    assert "5.5 s (polygons), 7.8 s (voxels 1.0 m), 217 s (voxels 0.2 m)" in note
-    # 360 pairs of 5.5 s are 0.55 hours
-    assert "0.55 / 0.78 / 22 h for these 360 pairs" in note
-    figure = chart.draw(points)
-    assert note in [text.get_text() for text in figure.texts]
-    assert note.split("\n")[0] in chart.page(points, "mine")
+def test_both_charts_show_the_engines_that_this_very_run_timed_and_no_other(points):
+    def names(table):
+        drawn = [text.get_text() for text in chart.draw(table).axes[1].get_legend().get_texts()]
+        return {name for name in chart.ENGINES.values() if name in drawn}, chart.page(table, "")
+
+    drawn, page = names(points)
+    assert drawn == {chart.ENGINES["transport"], chart.ENGINES["timestep"]}
+    assert chart.ENGINES["less"] not in page
+    rows = [*points.to_dict("records"), row(90.0, 0.1, engine="less", paths=800)]
+    drawn, page = names(tradeoff.table(rows))
+    assert drawn == set(chart.ENGINES.values())
+    assert "polygons 5 cm, LESS 3" in page
 
 
 def test_the_chart_has_logarithmic_axes_and_names_every_geometry(points, tmp_path):

@@ -13,7 +13,8 @@ import xarray as xr
 from dapple.advice.costs import Cost, least, repeated, timed
 from dapple.advice.geometries import Geometry
 from dapple.advice.pilot import light_and_costs
-from dapple.advice.tradeoff import PUBLISHED_S
+from dapple.light import less_engine
+from dapple.light.less_files import LessRays
 from dapple.light.light_model import Model, Tracing
 from dapple.light.timestep_series import Reference
 from dapple.light.tolerances import DIRECT_SHARE
@@ -29,6 +30,8 @@ from dapple.stats.agreement import rmse_rel
 FINEST_PATHS, FINEST_PATCHES = 65_536, 2305
 PATCHES = 577
 """Of settings that vary something else."""
+PUBLISHED_VOXELS = ("voxels_1.0", "voxels_0.2")
+"""Turbid voxels as large as those of Frey et al. (2025)."""
 
 
 @dataclass
@@ -52,6 +55,11 @@ class Grid:
         Rays of each kind that are tried with the per-timestep engine.
     timestep : dict
         Further settings of that engine.
+    less_rays : sequence of int
+        Rays of each sensor and time that are tried with LESS 3.
+    less : dict
+        Further settings of that engine: `bands` and `aperture_m` of `less_engine.series`, and
+        fields of `LessRays`.
     tracing : Tracing
         For what is known of sun and sensors.
     repeats : int
@@ -73,6 +81,8 @@ class Grid:
     timestep_rays: Sequence[int]
     timestep: dict[str, Any]
     tracing: Tracing
+    less_rays: Sequence[int]
+    less: dict[str, Any]
     repeats: int
     variant: str
     seed: int
@@ -115,7 +125,9 @@ class Grid:
             )
             one = _Tried(name, geometry.size_m, scene, self._finest(loaded))
             rows += self._by_transport(one, loaded, load_cost, max(first - again, 0.0), is_base)
-            if is_base or (name in PUBLISHED_S and name != "polygons"):
+            if is_base:
+                rows += self._by_less(one)
+            if is_base or name in PUBLISHED_VOXELS:
                 for_timesteps.append(one)
         for one in for_timesteps:
             rows += self._by_timestep(one)
@@ -196,6 +208,26 @@ class Grid:
                 engine="timestep",
                 paths=rays * options["replicates"],
                 max_orders=options["max_depth"] - 1,
+            )
+
+    def _by_less(self, one: "_Tried") -> Iterator[dict[str, Any]]:
+        """Points of LESS 3, which runs in a process of its own: its start is part of the cost."""
+        for rays in self.less_rays:
+            options = dict(self.less)
+            kept = {name: options.pop(name) for name in ("bands", "aperture_m")}
+            sampling = LessRays(**options | {"rays": rays}, seed=self.seed)
+            given = [one.scene], self.sky, self.optics, self.sensors
+            run = partial(less_engine.series, *given, rays=sampling, **kept)
+            found, cost = repeated(run, self.repeats)
+            yield self._point(
+                one,
+                f"LESS 3, {one.size_m:g} m, {rays} rays, {sampling.suns} suns",
+                found["par_umol_m2_s"].transpose("sensor", "time").to_numpy(),
+                cost,
+                0.0,
+                engine="less",
+                paths=rays,
+                max_orders=sampling.max_orders,
             )
 
     def _all_times(self, engine: Reference) -> np.ndarray:

@@ -22,8 +22,6 @@ COLUMNS = [
     "n_sensors",
     "n_times",
 ]
-PUBLISHED_S = {"polygons": 5.5, "voxels_1.0": 7.8, "voxels_0.2": 217.0}
-"""Seconds of one LESS run, one sensor at one time, on another machine: Frey et al. (2025)."""
 
 
 def front(cost: ArrayLike, error: ArrayLike) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from annotated_types import Ge, Le
 
@@ -12,6 +12,9 @@ from dapple.config.base import FREY, RIEGL, Count, NotNegative, Positive, Sectio
 class Scan(Section):
     """The virtual terrestrial scanner, after the RIEGL VZ-400i."""
 
+    program: Literal["dapple", "less"] = key(
+        "dapple", "dapple's own scanner, or that of LESS 3, which shares no code with it"
+    )
     positions: Count = key(8, "scan positions on a circle around the stem", FREY)
     radius_m: Positive = key(10.0, "distance of the positions from the stem", FREY)
     height_m: Positive = key(1.6, "height of the scanner above the ground")

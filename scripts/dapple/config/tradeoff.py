@@ -25,3 +25,6 @@ class Tradeoff(Section):
     timestep_rays: Some[Count] = key(
         (4, 16, 64), "rays of each kind, sensor, time and replicate of the per-timestep engine"
     )
+    less_rays: Some[Count] = key(
+        (800, 12_800), "rays of each sensor and time of LESS 3, where it computes or checks light"
+    )

@@ -11,12 +11,20 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from plotly.subplots import make_subplots
 
-from dapple.advice.tradeoff import PUBLISHED_S, front
+from dapple.advice.tradeoff import front
 from dapple.figures import style
 from dapple.formats import tables
 
-MARKERS = {"transport": ("o", "circle"), "timestep": ("s", "square")}
-ENGINES = {"transport": "transport engine", "timestep": "per-timestep Mitsuba"}
+MARKERS = {
+    "transport": ("o", "circle"),
+    "timestep": ("s", "square"),
+    "less": ("^", "triangle-up"),
+}
+ENGINES = {
+    "transport": "transport engine",
+    "timestep": "per-timestep Mitsuba",
+    "less": "LESS 3, its start included",
+}
 SHADES = {
     "polygons": ("#003B5C", "#0072B2", "#56A6D8", "#9CCBEB"),
     "surfels": ("#5B3A8C",),
@@ -42,19 +50,6 @@ def groups(points: pd.DataFrame) -> list[tuple[str, str, str, pd.DataFrame]]:
         label = f"{kind} {length}"
         found.append((label, shades[kind, size], engine, own.sort_values("cost_s")))
     return found
-
-
-def published_note(points: pd.DataFrame) -> str:
-    """What the published system needed, for as many sensors and times."""
-    pairs = int(points["n_sensors"].iloc[0] * points["n_times"].iloc[0])
-    runs = ", ".join(
-        f"{seconds:g} s ({style.label(name)})" for name, seconds in PUBLISHED_S.items()
-    )
-    hours = " / ".join(f"{seconds * pairs / 3600:.2g}" for seconds in PUBLISHED_S.values())
-    return (
-        f"Another machine, for orientation: LESS took {runs} for one sensor at one time\n"
-        f"(Frey et al. 2025, 66,000 runs); {hours} h for these {pairs:,} pairs."
-    )
 
 
 def _titles(points: pd.DataFrame) -> tuple[str, str]:
@@ -95,9 +90,7 @@ def draw(points: pd.DataFrame) -> Figure:
         axes.set_title(title)
         axes.set_xlabel(_cost_title(points))
     panels[0].set_ylabel(ERROR_TITLE)
-    _legend(panels[1])
-    figure.get_layout_engine().set(rect=(0, 0.07, 1, 0.93))
-    figure.text(0.01, 0.01, published_note(points), fontsize=7.5, color="#444444")
+    _legend(panels[1], set(points["engine"]))
     return figure
 
 
@@ -135,7 +128,7 @@ def _panel(axes: Axes, points: pd.DataFrame, error: str) -> None:
 def _ladder(own: pd.DataFrame) -> pd.DataFrame:
     """Points that differ in their number of rays alone: with the most patches and orders."""
     own = own.sort_values("paths")
-    if own["engine"].iloc[0] == "timestep":
+    if own["engine"].iloc[0] != "transport":
         return own
     finest = own[["sky_patches", "max_orders"]].max()
     return own[
@@ -172,9 +165,10 @@ def _label(axes: Axes, labels: list[tuple[str, str, float, float]], points: np.n
         )
 
 
-def _legend(axes: Axes) -> None:
+def _legend(axes: Axes, engines: set[str]) -> None:
     for engine, (marker, _) in MARKERS.items():
-        axes.scatter([], [], marker=marker, color="#666666", s=26, label=ENGINES[engine])
+        if engine in engines:
+            axes.scatter([], [], marker=marker, color="#666666", s=26, label=ENGINES[engine])
     axes.scatter([], [], marker="o", color="#666666", s=9, label="fewer patches or orders")
     axes.plot(
         [], [], color=FRONT_COLOUR, linewidth=0.8, linestyle=(0, (4, 2)), label="Pareto front"
@@ -244,15 +238,4 @@ def to_explore(points: pd.DataFrame) -> go.Figure:
         figure.update_xaxes(type="log", title_text=_cost_title(points), row=1, col=column)
         figure.update_yaxes(type="log", tickformat=".2~%", row=1, col=column)
     figure.update_yaxes(title_text=ERROR_TITLE, row=1, col=1)
-    figure.add_annotation(
-        text=published_note(points).replace("\n", " "),
-        xref="paper",
-        yref="paper",
-        x=0,
-        y=-0.17,
-        showarrow=False,
-        font={"size": 11, "color": "#444"},
-    )
-    return figure.update_layout(
-        template="plotly_white", height=650, margin={"b": 110}, hovermode="closest"
-    )
+    return figure.update_layout(template="plotly_white", height=650, hovermode="closest")

@@ -1,6 +1,8 @@
 """A terrestrial laser scanner in a virtual world, modelled on the RIEGL VZ-400i."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 
 import numpy as np
 
@@ -10,11 +12,12 @@ from dapple.formats.meshes import Mesh
 from dapple.formats.shots import Shots
 from dapple.progress import followed
 from dapple.streams import stream_seed
+from dapple.virtual import less_scanner
 from dapple.virtual.scanner_beam import beam_pattern
 from dapple.virtual.scanner_model import Scanner
-from dapple.virtual.scanner_returns import echoes, false_echoes
+from dapple.virtual.scanner_returns import Returns, echoes, false_echoes
 from dapple.virtual.scanner_window import grid_directions, through_box
-from dapple.virtual.scanner_world import build
+from dapple.virtual.scanner_world import World, build
 
 CHUNK_SHOTS = 1 << 16
 """Shots traced together: always this many, so that one kernel serves and results repeat."""
@@ -56,6 +59,7 @@ def scan_chunks(
     positions_m: np.ndarray,
     *,
     seed: int,
+    program: str = "dapple",
     ground_z_m: float | None = None,
     window_m: tuple[np.ndarray, np.ndarray] | None = None,
     window_margin_m: float = 1.0,
@@ -72,6 +76,8 @@ def scan_chunks(
         Where the beam leaves the scanner; they get the scan numbers 1 to k.
     seed : int
         Same seed, same bytes.
+    program : str
+        "dapple": its own scanner; "less": that of LESS 3, which adds no noise of its own.
     ground_z_m : float, optional
         Height of a flat ground without end [m]; without it there is none.
     window_m : two (3,) float64, optional
@@ -98,31 +104,30 @@ def scan_chunks(
     scanner = Scanner(**settings)
     positions_m = np.asarray(positions_m, np.float64).reshape(-1, 3)
     low_m, high_m = _window(meshes, positions_m, window_m, window_margin_m, scanner)
-    world = build(meshes, ground_z_m, 0.5 * (low_m + high_m), scanner, seed)
     world_origin_m = np.zeros(3) if world_origin_m is None else np.asarray(world_origin_m, float)
     number = -1
-    for number, (index, direction) in enumerate(
-        _chunks_of_beams(positions_m, low_m, high_m, scanner)
-    ):
-        rng = np.random.default_rng(stream_seed(seed, "shots", number))
-        origin_m = positions_m[index]
-        _, leave_m = through_box(origin_m, direction, low_m, high_m)
-        returns = echoes(world, scanner, origin_m, direction, rng, CHUNK_SHOTS)
-        returns, first = returns.together_with(false_echoes(leave_m, scanner, rng)).nearest_first(
-            len(direction), scanner.max_returns
-        )
-        yield Shots(
-            origin_m,
-            direction,
-            (index + 1).astype(np.uint16),
-            first,
-            # float32 first: a file of shots then gives back exactly these numbers
-            returns.range_m.astype(np.float32).astype(np.float64),
-            returns.reflectance_db.astype(np.float32),
-            returns.deviation.astype(np.float32),
-            world_origin_m,
-            returns.truth,
-        )
+    with _shooter(program, meshes, positions_m, ground_z_m, (low_m, high_m), scanner, seed) as fire:
+        for number, (index, direction) in enumerate(
+            _chunks_of_beams(positions_m, low_m, high_m, scanner)
+        ):
+            rng = np.random.default_rng(stream_seed(seed, "shots", number))
+            origin_m = positions_m[index]
+            ends_m = through_box(origin_m, direction, low_m, high_m)
+            returns, first = fire(origin_m, direction, *ends_m, rng).nearest_first(
+                len(direction), scanner.max_returns
+            )
+            yield Shots(
+                origin_m,
+                direction,
+                (index + 1).astype(np.uint16),
+                first,
+                # float32 first: a file of shots then gives back exactly these numbers
+                returns.range_m.astype(np.float32).astype(np.float64),
+                returns.reflectance_db.astype(np.float32),
+                returns.deviation.astype(np.float32),
+                world_origin_m,
+                returns.truth,
+            )
     if number < 0:
         raise InputError(
             "scan.positions_m",
@@ -130,6 +135,40 @@ def scan_chunks(
             "the window within the field of view",
             "Move the scanner or widen zenith_min_deg to zenith_max_deg.",
         )
+
+
+def _shooter(
+    program: str,
+    meshes: dict[str, Mesh],
+    positions_m: np.ndarray,
+    ground_z_m: float | None,
+    window_m: tuple[np.ndarray, np.ndarray],
+    scanner: Scanner,
+    seed: int,
+) -> AbstractContextManager[Callable[..., Returns]]:
+    """What gives the returns of beams (`origin_m`, `direction`, `enter_m`, `leave_m`, `rng`)."""
+    if program == "less":
+        reach_m = (
+            np.minimum(window_m[0], positions_m.min(axis=0)),
+            np.maximum(window_m[1], positions_m.max(axis=0)),
+        )
+        return less_scanner.shooter(meshes, ground_z_m, reach_m, scanner, seed)
+    world = build(meshes, ground_z_m, 0.5 * (window_m[0] + window_m[1]), scanner, seed)
+    return nullcontext(partial(_fire, world, scanner))
+
+
+def _fire(
+    world: World,
+    scanner: Scanner,
+    origin_m: np.ndarray,
+    direction: np.ndarray,
+    enter_m: np.ndarray,
+    leave_m: np.ndarray,
+    rng: np.random.Generator,
+) -> Returns:
+    """Returns of dapple's own scanner, false ones among them."""
+    found = echoes(world, scanner, origin_m, direction, rng, CHUNK_SHOTS)
+    return found.together_with(false_echoes(leave_m, scanner, rng))
 
 
 def _window(meshes, positions_m, window_m, margin_m, scanner) -> tuple[np.ndarray, np.ndarray]:

@@ -82,9 +82,7 @@ def build(
         raise InputError("meshes", "no triangle", "a plant or a ground", "Check the plant.")
     brightness, kind = [], []
     for name, mesh in parts:
-        mean, sd = getattr(scanner, f"{name}_reflectance_db")
-        rng = np.random.default_rng(stream_seed(seed, "reflectance", name))
-        of_element = mean + sd * rng.standard_normal(mesh.n_elements)
+        of_element = brightness_db(name, mesh, scanner, seed)
         brightness.append(10.0 ** (0.1 * of_element[mesh.element]))
         kind.append(np.full(len(mesh.faces), list(KINDS).index(name), np.uint8))
     whole = concatenate([mesh for _, mesh in parts])
@@ -99,6 +97,13 @@ def build(
         np.concatenate(brightness),
         np.concatenate(kind),
     )
+
+
+def brightness_db(name: str, mesh: Mesh, scanner: Scanner, seed: int) -> np.ndarray:
+    """(n_elements,) reflectance of each element at normal incidence, of a white plate's [dB]."""
+    mean, sd = getattr(scanner, f"{name}_reflectance_db")
+    rng = np.random.default_rng(stream_seed(seed, "reflectance", name))
+    return mean + sd * rng.standard_normal(mesh.n_elements)
 
 
 def trace(world: World, rays: np.ndarray, max_range_m: float) -> tuple[np.ndarray, np.ndarray]:
