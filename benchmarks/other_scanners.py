@@ -59,7 +59,7 @@ SCANNERS: dict[str, dict[str, Any]] = {
 }
 
 
-def of_tree(seed: int) -> Iterator[dict[str, Any]]:
+def of_tree(seed: int, scanners: dict[str, dict[str, Any]]) -> Iterator[dict[str, Any]]:
     """Rows of one tree: each scanner, each reconstruction."""
     path = ROOT / "config/stability-small.yaml"
     usual = setup(validate(yaml.safe_load(path.read_text())))
@@ -67,13 +67,17 @@ def of_tree(seed: int) -> Iterator[dict[str, Any]]:
     truth = first.light("truth", UNDISTURBED).par
     open_sky = first.open_sky(UNDISTURBED)
     leaf_area_m2 = first.structure("truth", UNDISTURBED).leaf_area_m2
-    for name, changed in SCANNERS.items():
+    wood_area_m2 = first.tree(UNDISTURBED)["wood"].area_m2
+    for name, changed in scanners.items():
         chain = Chain(replace(usual, scan=dict(usual.scan) | changed), seed)
         cloud = chain.classes(UNDISTURBED)
         shots = chain.shots(UNDISTURBED)
         common = {
             "scanner": name,
             "points_per_return": len(cloud) / max(len(shots.range_m), 1),
+            "misses": np.mean(shots.n_returns == 0),
+            "several_returns": np.mean(shots.n_returns > 1),
+            "wood_area_rel": chain.polygons(UNDISTURBED)["wood"].area_m2 / wood_area_m2,
             "told_leaf": np.mean(cloud.attributes["Classification"] == LEAF),
         }
         for made in RECONSTRUCTIONS:
@@ -93,7 +97,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[301, 302])
     parser.add_argument("--docs", type=Path, default=ROOT / "docs")
     options = parser.parse_args()
-    rows = pd.DataFrame([row for seed in options.seeds for row in of_tree(seed)])
+    rows = pd.DataFrame([row for seed in options.seeds for row in of_tree(seed, SCANNERS)])
     found = rows.groupby(["scanner", "reconstruction"], sort=False).mean().reset_index()
     found.insert(2, "trees", len(options.seeds))
     tables.write(options.docs / "data/other_scanners.csv", found, "%.4g")

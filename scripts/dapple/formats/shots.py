@@ -131,17 +131,19 @@ def to_cloud(shots: Shots) -> Cloud:
     Returns
     -------
     Cloud
-        In the order of `shots`, with `Reflectance` [dB], `Deviation`, `ReturnNumber` (from 1),
-        `NumberOfReturns`, `PointSourceId` (scan), and `TrueClass` where the truth is known.
+        In the order of `shots`, with `Reflectance` [dB], `Deviation` where the scanner tells any,
+        `ReturnNumber` (from 1), `NumberOfReturns`, `PointSourceId` (scan), and `TrueClass` where
+        the truth is known.
     """
     n_returns, shot = shots.n_returns, shots.shot_of_return
     attributes = {
         "Reflectance": shots.reflectance_db.astype(np.float32),
-        "Deviation": shots.deviation.astype(np.float32),
         "ReturnNumber": (np.arange(len(shot)) - shots.first[shot] + 1).astype(np.uint8),
         "NumberOfReturns": n_returns[shot].astype(np.uint8),
         "PointSourceId": shots.scan[shot].astype(np.uint16),
     }
+    if not np.isnan(shots.deviation).all():
+        attributes["Deviation"] = shots.deviation.astype(np.float32)
     if shots.truth is not None:
         attributes["TrueClass"] = shots.truth.astype(np.uint8)
     return Cloud(shots.return_xyz_m, np.asarray(shots.world_origin_m, np.float64), attributes)
