@@ -25,6 +25,7 @@ def main() -> None:
     parser.add_argument("--docs", type=Path, default=ROOT / "docs")
     options = parser.parse_args()
     rows = pd.DataFrame(of_tree(options.seed, SCANNERS))
+    rows.insert(1, "reconstruction", rows.pop("reconstruction"))
     tables.write(options.docs / "data/less_scanner.csv", rows, "%.4g")
     print(rows.to_string(float_format=lambda value: f"{value:.3f}"))
 
