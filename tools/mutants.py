@@ -20,6 +20,7 @@ import multiprocessing
 import os
 import re
 import resource
+import signal
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -44,7 +45,7 @@ MESSAGE = re.compile(r"raise |log\.|\w*Error\(|warnings\.")
 FAULT = ["module", "line", "fault"]
 # Seconds of a processor for the tests of one fault, as they took without it, and for one file.
 BUDGET_S, SLOW_S = 30, 15
-WAIT = 4  # seconds of the clock that a test may take for one of a processor
+WAIT = 30  # seconds of the clock for one of a processor: what waits for nothing ends too
 AHEAD = ("scipy.optimize", "xarray", "pyarrow.parquet", "matplotlib.figure")
 
 
@@ -132,8 +133,9 @@ class Tree(importlib.abc.MetaPathFinder, importlib.abc.Loader):
         exec(compile(self.tree, self.path, "exec"), module.__dict__)
 
 
-def run(tests: tuple[Path, ...], tree: Tree | None) -> None:
+def run(tests: tuple[Path, ...], tree: Tree | None, limit_s: int) -> None:
     """Run tests, with another tree of one module if told; the exit code says whether they pass."""
+    resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s + 1))
     with tempfile.TemporaryDirectory() as folder:
         if tree:
             sys.meta_path.insert(0, tree)
@@ -147,13 +149,15 @@ def run(tests: tuple[Path, ...], tree: Tree | None) -> None:
 
 def exit_code(tests: tuple[Path, ...], tree: Tree | None, limit_s: float) -> int | None:
     """How tests end in a child of this process; None if they are far from it at the limit."""
-    child = multiprocessing.get_context("fork").Process(target=run, args=(tests, tree))
+    child = multiprocessing.get_context("fork").Process(
+        target=run, args=(tests, tree, int(limit_s))
+    )
     child.start()
     child.join(WAIT * limit_s)
     alive = child.is_alive()
     child.kill()
     child.join()
-    return None if alive else child.exitcode
+    return None if alive or child.exitcode == -signal.SIGXCPU else child.exitcode
 
 
 def noticed(module: str, tree: Tree) -> bool:

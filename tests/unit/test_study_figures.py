@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 from tests import legibility
 
-from dapple.figures import chlorophyll_maps, survey_charts
+from dapple.figures import chlorophyll_maps, crown_map, effects_chart, survey_charts
+from dapple.formats.rasters import Raster
 
 STANDS = ("fagus", "platanus")
 DESIGNS = ("single", "diamond", "corners")
@@ -130,3 +131,41 @@ def test_no_word_of_a_study_is_cut_off_or_written_over(name):
     figure = FIGURES[name]()
     assert legibility.is_whole(figure)
     assert legibility.overwritten_titles(figure) == []
+
+
+def test_a_line_for_every_level_but_the_finest_has_its_effect_and_its_share_of_the_cost():
+    def level(name, effect, cpu_s):
+        return {"level": name, "rmse_rel": effect, "effect_rel": effect, "cpu_s": cpu_s}
+
+    facts = {
+        "tolerance": 0.01, "run_step_min": 10, "chosen": {"sky_patches": 145},
+        "refinements": {
+            "sky_patches": [level(577, 0.0, 20.0), level(145, 0.004, 10.0), level(1, 0.2, 5.0)],
+            "step_min": [level(1, 0.0, 8.0), level(10, 0.03, 2.0)],
+        },
+        "geometry": {"wood": [level("kept", 0.0, 4.0), level("left out", 0.0000001, 3.0)]},
+    }  # fmt: skip
+    figure = effects_chart.draw(facts)
+    effects, costs = figure.axes
+    names = [label.get_text() for label in effects.get_yticklabels()]
+    shares = [bar.get_width() for bar in costs.patches]
+    assert dict(zip(names, shares, strict=True)) == {
+        "sky patches: 145": 0.5, "sky patches: 1": 0.25, "sun every 10 min": 0.25,
+        "wood left out": 0.75,
+    }  # fmt: skip
+    said = {text.get_text() for text in effects.texts}
+    assert {"0.4 %", "20 %", "3 %", "0.001 %"} <= said
+    colours = [line.get_color() for line in effects.lines if line.get_marker() == "o"][:4]
+    assert colours[::-1] == [
+        effects_chart.LEFT_OUT, effects_chart.KEPT, *[effects_chart.GEOMETRY] * 2,
+    ]  # fmt: skip
+
+
+def test_a_slice_through_crowns_holds_what_lies_in_it():
+    height = Raster(np.full((1, 8, 8), 5.0, np.float32), 100.0, 208.0, 1.0, "", ("height_m",))
+    labels = Raster(np.ones((1, 8, 8), np.float32), 100.0, 208.0, 1.0, "", ("crown",))
+    places = np.array([[102.0, 203.5, 1.0], [103.0, 204.4, 3.0], [104.0, 206.0, 2.0]])
+    figure = crown_map.crowns(height, labels, places, places[:2], slice_m=1.0)
+    points, facets = (figure.axes[k].collections[0].get_offsets() for k in (1, 2))
+    assert points.tolist() == facets.tolist() == [[2.0, 0.0], [3.0, 2.0]]
+    assert "1 m deep" in figure.axes[1].get_title("left")
