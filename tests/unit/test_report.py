@@ -241,7 +241,7 @@ def test_studies_without_a_verdict_open_with_what_they_found(tmp_path):
     )  # fmt: skip
     page = written(tmp_path / "stability", {"stability/thresholds.csv": thresholds})
     assert "Of 2 kinds of trouble" in page
-    assert "surfels 0, polygons 2" in page
+    assert "0 for surfels, 2 for polygons" in page
     accuracy = pd.DataFrame(
         {"plot": "larch", "model": ["semi_less", "prosail"], "test_set": "field", "n": 12,
          "seed": "ensemble", "rmse": [4.0, 8.0]}

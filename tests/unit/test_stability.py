@@ -121,6 +121,19 @@ def test_published_findings_are_counted_over_worlds():
     assert row["polygons_larger"] == 1.0
 
 
+def test_a_level_of_the_map_is_written_within_its_cell():
+    levels = {"6.5 cm": 0.9, "needles 3 mm": 0.8, "needles 1 mm": 0.7}
+    rows = {float(k): (r, 0.1) for k, r in enumerate(levels.values())}
+    points = runs(rows, reconstruction="polygons", stressor="leaf_size")
+    named = dict(enumerate(levels))
+    ax = stability_map.heat_map(points.assign(label=points["level"].map(named))).axes[0]
+    ax.figure.draw_without_rendering()
+    cell = ax.transData.transform([[0, 0], [1, 0]])[:, 0]
+    written = [text.get_window_extent().width for text in ax.texts]
+    assert "needles\n3 mm" in [text.get_text() for text in ax.texts]
+    assert max(written) < cell[1] - cell[0]
+
+
 def test_figures_show_a_map_with_gaps_and_failures():
     points = pd.concat(
         [

@@ -102,8 +102,9 @@ def _write(ax, values, labels, failed, norm) -> None:
         number = f"{value:.2f}" if np.isfinite(value) else "none"
         mark = " ✕" if failed is not None and failed[row, k] else ""
         size = 7.6 if len(labels[row, k]) < 8 else 5.8  # words are longer than numbers
-        ax.text(k, row - 0.21, labels[row, k], ha="center", va="center", fontsize=size,
-                color=colour)  # fmt: skip
+        label = labels[row, k].replace(" ", "\n", 1) if len(labels[row, k]) > 9 else labels[row, k]
+        ax.text(k, row - 0.21, label, ha="center", va="center", fontsize=size,
+                color=colour, linespacing=0.9)  # fmt: skip
         ax.text(k, row + 0.22, f"{number}{mark}", ha="center", va="center", fontsize=7.6,
                 color=colour, weight="bold" if mark else "normal")  # fmt: skip
 

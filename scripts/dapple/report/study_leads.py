@@ -40,10 +40,10 @@ def _stability(table: pd.DataFrame) -> Iterator[str]:
     n = table["stressor"].nunique()
     failed = table.dropna(subset="level").groupby("reconstruction")["stressor"].nunique()
     failed = failed.reindex(table["reconstruction"].unique(), fill_value=0).sort_values()
-    counts = ", ".join(f"{called(str(name))} {count}" for name, count in failed.items())
+    counts = ", ".join(f"{count} for {called(str(name))}" for name, count in failed.items())
     yield (
-        f"Of {n} kinds of trouble that a scan can have, each made worse step by step, this many "
-        f"made a reconstruction fail: {counts}."
+        f"Of {n} kinds of trouble that a scan can have, each made worse step by step, so many cost "
+        f"a reconstruction a fifth of its r or doubled its error: {counts}."
     )
 
 

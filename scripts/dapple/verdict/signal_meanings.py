@@ -50,6 +50,7 @@ def _said(value: float) -> dict[str, float]:
 
 MORE_SCANS = "Scan from more positions, spread evenly around the tree; `survey_next` proposes them."
 DENSER = "Scan with a smaller angular step or from nearer."
+FEWER_POLYGONS = f"Set polygons.voxel_size_m to auto. {DENSER}"
 COARSER = "Take larger voxels, or scan with a smaller angular step."
 FINER = "Take smaller voxels, as far as enough shots enter them, or polygons."
 REGISTER = "Register the scans again with more tie points, and scan in still air."
@@ -102,9 +103,11 @@ SIGNALS = {
     ),
     "wood_share": Signal(0, "{value:.0%} of the points are wood", CLASSES),
     "sparse_polygons": Signal(
-        1, "{value:.0%} of the polygons are made of one or two points", DENSER
+        1, "{value:.0%} of the polygons are made of one or two points", FEWER_POLYGONS
     ),
-    "points_per_polygon": Signal(-1, "{value:.1f} points in a polygon", DENSER, is_log=True),
+    "points_per_polygon": Signal(
+        -1, "{value:.1f} points in a polygon", FEWER_POLYGONS, is_log=True
+    ),
     "distance_to_polygons": Signal(
         1, "points lie {value:.2f} of a polygon's size off its plane", REGISTER
     ),
