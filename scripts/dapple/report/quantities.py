@@ -77,7 +77,7 @@ QUANTITIES = {
     "true_leaf_area_m2": Quantity("true leaf area", "m²", "Of the virtual plant."),
     "wood_area_m2": Quantity("wood area", "m²", "Surface of stem and branches."),
     "n_elements": Quantity("elements", meaning="Polygons, discs, leaves, or voxels with leaves."),
-    "n_added": Quantity("elements added", meaning="Polygons that the correction of occlusion added."),
+    "n_added": Quantity("elements added", meaning="Polygons that fill what was occluded."),
     "n_wood_elements": Quantity("wood elements", meaning="Polygons of stem and branches."),
     "volume_m3": Quantity("volume", "m³", "Of the cells in which something stands."),
     "n_unknown": Quantity("unknown voxels", meaning="Voxels which too few shots entered."),
