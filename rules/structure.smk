@@ -187,8 +187,12 @@ rule export:
             axes=["less", "dart"],
         ),
         expand(results("export/{name}/scene.glb"), name=LIT),
+        expand(
+            results("export/{name}/exchange"),
+            name=[name for name in LIT if not name.startswith("voxels_")],
+        ),
     message:
-        said("OBJ for LESS 2 and DART, scenes for LESS 3 and as glTF")
+        said("OBJ for LESS 2 and DART, scenes for LESS 3, as glTF and to be exchanged")
 
 
 rule voxels_summary:

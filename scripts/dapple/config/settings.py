@@ -20,6 +20,7 @@ from dapple.config.clean import Clean
 from dapple.config.cloud import CloudInput
 from dapple.config.corrections import Corrections
 from dapple.config.download import Download
+from dapple.config.exchange import Exchange
 from dapple.config.explain import explain
 from dapple.config.figures import Figures
 from dapple.config.leaves import Leaves
@@ -97,6 +98,7 @@ class Settings(Section):
     light: Light = Light()
     advice: Advice = Advice()
     tradeoff: Tradeoff = Tradeoff()
+    exchange: Exchange = Exchange()
     statistics: Statistics = Statistics()
     figures: Figures = Figures()
     survey: Survey = Survey()
