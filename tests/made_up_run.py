@@ -82,7 +82,8 @@ def _tables(labels):
     pairs = [(name, label) for name in NAMES for label in labels]
     records = [
         {"reconstruction": name, "sensor": label, "time": time.tz_localize("UTC"),
-         "measured": 300.0, "simulated": 300.0 + ERROR[name], "direct": 0.0, "part": "reporting"}
+         "measured": 300.0, "simulated": 300.0 + ERROR[name], "direct": 0.0, "low": 280.0,
+         "high": 410.0, "part": "reporting"}
         for name, label in pairs
         for time in TIMES
     ]  # fmt: skip

@@ -61,7 +61,7 @@ def test_few_leaves_are_drawn_as_they_are(tmp_path):
 
 def test_the_chart_of_sensors_has_their_series_records_and_scores_by_label(folder):
     run = run_light.read(folder)
-    chart, by_reconstruction, by_sensor = sensor_view.blocks(run, folder)
+    chart, by_reconstruction, by_sensor = sensor_view.blocks(run)
     data = chart.data
     assert data["sensors"] == LABELS
     assert data["times"][0] == "2023-08-10 12:00:00"  # two hours ahead of UTC
@@ -75,9 +75,16 @@ def test_the_chart_of_sensors_has_their_series_records_and_scores_by_label(folde
     assert [row[0].text for row in by_sensor.rows] == LABELS
 
 
+def test_the_chart_of_sensors_draws_the_predictive_interval_of_every_record(folder):
+    chart = next(sensor_view.blocks(run_light.read(folder)))
+    assert (unpacked(chart.data["bounds"]["low"])[0] == 280).all()
+    assert (unpacked(chart.data["bounds"]["high"])[0] == 410).all()
+    assert "90% of records" in chart.caption
+
+
 def test_long_series_are_thinned_and_the_caption_says_so(folder, monkeypatch):
     monkeypatch.setattr(sensor_view, "MOST_VALUES", 24)
-    chart = next(sensor_view.blocks(run_light.read(folder), folder))
+    chart = next(sensor_view.blocks(run_light.read(folder)))
     assert unpacked(chart.data["simulated"]).shape == (2, 2, 6)
     assert "Every 2th time is shown" in chart.caption
 
@@ -112,6 +119,6 @@ def test_a_night_has_a_page_too_and_what_is_not_known_is_null(folder):
                 found[key] = found[key] * 0 if "normal" not in str(key) else found[key].clip(max=0)
                 found[key].attrs = {"units": "1", "long_name": "made up"}
         netcdf.write(folder / name, found)
-    data = next(sensor_view.blocks(run_light.read(folder), folder)).data
+    data = next(sensor_view.blocks(run_light.read(folder))).data
     assert data["flecks"] == [[None, None]] * 2
     json.loads(json.dumps(data, allow_nan=False))

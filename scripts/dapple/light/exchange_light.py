@@ -1,5 +1,7 @@
 """Light at the sensors of an exchanged scene, by Mitsuba's integrators, band by band."""
 
+from functools import partial
+
 import pandas as pd
 
 from dapple.light.timestep import Rays, timestep
@@ -36,9 +38,7 @@ def light(
     places = lit.sensors[POSITION].to_numpy(float)
     parts = []
     for band, name in enumerate(followed(list(lit.bands_nm), "bands")):
-        scene = mitsuba_scene.build(
-            lit.scene, lit.optics.each(lambda values, at=band: values[at : at + 1]), variant=variant
-        )
+        scene = mitsuba_scene.build(lit.scene, lit.optics.of_band(band), variant=variant)
         found = timestep(
             scene,
             places,
@@ -46,7 +46,7 @@ def light(
             sun_azimuth_deg=azimuth,
             beam_normal=beam[band : band + 1],
             diffuse_horizontal=diffuse[band : band + 1],
-            sky=lambda *angles, at=band: sky.radiance_at(at, *angles),
+            sky=partial(sky.radiance_at, band),
             sun_diameter_deg=sun_diameter_deg,
             rays=rays,
             aperture_m=lit.aperture_m,

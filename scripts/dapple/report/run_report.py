@@ -52,7 +52,7 @@ def build(experiment: str, folder: Path, captions: Mapping[str, str]) -> str:
         Section("What was noticed about the input", findings_list.of_run(folder)),
         Section("The tree", [*_tree(folder, run)]),
         Section("Light on the ground", [*ground_view.blocks(run, folder)] if run else ()),
-        Section("Light at the sensors", [*sensor_view.blocks(run, folder)] if run else ()),
+        Section("Light at the sensors", [*sensor_view.blocks(run)] if run else ()),
         Section("Where it is off", [*residuals.blocks(run)] if run else ()),
         Section("Numbers", [*numbers.of_files(folder, numbers.COMPARED)]),
         Section("Structure", [*numbers.structure(folder)]),

@@ -1,31 +1,29 @@
 """Any sensor's series against its records, chosen on the plan; and sums of a day by sensor."""
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 
 from dapple.figures import style
-from dapple.formats import tables
 from dapple.report import packing
 from dapple.report.blocks import Block, Chart, Table, table
 from dapple.report.run_light import RunLight
 from dapple.stats import daily_light
-from dapple.stats.pairs import measured
+from dapple.stats.pairs import measured, of_sensors
+from dapple.stats.predictive import COVERAGE
 
-NORMAL_95 = 1.96
-"""Standard deviations within which 95 % of a normal distribution lie."""
 MOST_VALUES = 1_500_000
 """Values of series within the page; times are thinned evenly above."""
 LONGEST_FLECK_STEP_MIN = 10.0
 """Steps above which single sunflecks cannot be told apart."""
 
 
-def blocks(run: RunLight, folder: Path) -> Iterator[Block]:
+def blocks(run: RunLight) -> Iterator[Block]:
     """The chart to choose sensors in, then sums by reconstruction and by sensor."""
-    yield _chart(run, folder)
+    yield _chart(run)
     sums = {name: _sums(run, name) for name in run.light}
     columns = [name for name in next(iter(sums.values())) if name != "sensor"]
     means = [{"reconstruction": name} | dict(one[columns].mean()) for name, one in sums.items()]
@@ -69,7 +67,7 @@ def _sums(run: RunLight, name: str) -> pd.DataFrame:
     return found
 
 
-def _chart(run: RunLight, folder: Path) -> Chart:
+def _chart(run: RunLight) -> Chart:
     names, every = list(run.light), _stride(run)
     times = run.times[::every]
     series = [
@@ -93,7 +91,7 @@ def _chart(run: RunLight, folder: Path) -> Chart:
         "records": _records(run),
         "r": _scores(run, "r", 3),
         "rmse": _scores(run, "rmse", 1),
-        "interval": _intervals(folder, names),
+        "bounds": _bounds(run),
     }
     caption = (
         "Choose a sensor on the plan or in the list: its light in every reconstruction, and what "
@@ -103,10 +101,10 @@ def _chart(run: RunLight, folder: Path) -> Chart:
         caption += " Pale on the plan: nothing is known, as no record of them counts."
     if every > 1:
         caption += f" Every {every}th time is shown."
-    if data["interval"]:
+    if data["bounds"]:
         caption += (
-            " The band is where 95 % of records are expected around the chosen reconstruction, by "
-            "the mixed model of the records themselves."
+            f" The band is where {COVERAGE:.0%} of records are expected around the chosen "
+            "reconstruction, from the errors in worlds where light is known."
         )
     return Chart("sensors", "sensors", caption, data)
 
@@ -119,13 +117,31 @@ def _stride(run: RunLight) -> int:
 def _records(run: RunLight) -> dict[str, Any] | None:
     if run.records is None:
         return None
-    found = measured(run.records).reindex(sensor=run.sensors["sensor"].to_numpy(str))
-    every = -(-found.size // MOST_VALUES)
-    times = pd.DatetimeIndex(found["time"].to_numpy()[::every])
+    found = _of_all_sensors(run, run.records["reconstruction"].iloc[0], "measured")
     return {
-        "times": packing.local(times, run.timezone),
-        "par": packing.light(found.to_numpy()[:, ::every]),
+        "times": packing.local(pd.DatetimeIndex(found["time"].to_numpy()), run.timezone),
+        "par": packing.light(found.to_numpy()),
     }
+
+
+def _bounds(run: RunLight) -> dict[str, Any] | None:
+    """Predictive interval of every reconstruction, sensor and record."""
+    if run.records is None or not {"low", "high"} <= set(run.records):
+        return None
+    return {
+        edge: packing.light(np.stack([_of_all_sensors(run, name, edge) for name in run.light]))
+        for edge in ("low", "high")
+    }
+
+
+def _of_all_sensors(run: RunLight, reconstruction: str, column: str) -> xr.DataArray:
+    """A column of the records of one reconstruction, thinned; NaN where there are none."""
+    times = measured(run.records)["time"].to_numpy()
+    sensors = run.sensors["sensor"].to_numpy(str)
+    columns = 1 + 2 * len(run.light)  # what is measured, and two bounds of every reconstruction
+    every = -(-len(sensors) * len(times) * columns // MOST_VALUES)
+    found = of_sensors(run.records, reconstruction, column)
+    return found.reindex(sensor=sensors, time=times[::every])
 
 
 def _scores(run: RunLight, column: str, digits: int) -> list[list[float | None]] | None:
@@ -135,23 +151,3 @@ def _scores(run: RunLight, column: str, digits: int) -> list[list[float | None]]
     wide = run.per_sensor.pivot(index="reconstruction", columns="sensor", values=column)
     wide = wide.reindex(index=list(run.light), columns=run.sensors["sensor"])
     return [packing.known(row, digits) for row in wide.to_numpy(float)]
-
-
-def _intervals(folder: Path, names: list[str]) -> list[dict[str, float] | None] | None:
-    """Line and half width of the 95 % interval of a record, by reconstruction."""
-    path = folder / "statistics/mixed_model.csv"
-    if not path.is_file():
-        return None
-    models = tables.read(path).set_index("reconstruction")
-    found: list[dict[str, float] | None] = []
-    for name in names:
-        row = models.loc[name] if name in models.index else pd.Series(dtype=float)
-        spread = float(np.hypot(row.get("sensor_sd", np.nan), row.get("residual_sd", np.nan)))
-        line = {"intercept": row.get("intercept"), "slope": row.get("slope")}
-        known = np.isfinite([*map(float, line.values()), spread]).all() if len(row) else False
-        found.append(
-            {key: float(value) for key, value in line.items()} | {"half": NORMAL_95 * spread}
-            if known
-            else None
-        )
-    return found if any(found) else None

@@ -27,6 +27,8 @@ from dapple.sky.sky_radiance import FLUXES, in_directions
 
 BANDS_NM = {"blue": (400.0, 500.0), "green": (500.0, 600.0), "red": (600.0, 700.0)}
 COLOURS = {"plants": (0.2, 0.5, 0.1), "background": (0.4, 0.35, 0.3), "sensors": (1.0, 1.0, 1.0)}
+Nodes = dict[str, tuple[Mesh, np.ndarray | None, np.ndarray]]
+"""As `formats.gltf.write` takes them."""
 AROUND = 25.0
 """Half of the width of flat ground, in heights of what stands on it."""
 POINT_M = 1e-3
@@ -101,30 +103,30 @@ def at_highest_sun(
 def write(folder: Path, lit: LitScene, description: str) -> None:
     """Write a scene into a folder, which is made where it is missing."""
     folder.mkdir(parents=True, exist_ok=True)
-    plants, background, kinds = {}, {}, {"plants": [], "background": []}
+    meshes: dict[str, Nodes] = {"plants": {}, "background": {}}
+    materials: dict[str, dict[str, str]] = {"plants": {}, "background": {}}
     for number, one in enumerate(lit.scene.filled):
-        name, of = f"{one.optics}_{number}", "plants"
-        if one.optics == lit.scene.ground_optics:
-            of = "background"
-        where = plants if of == "plants" else background
-        where[name] = (one.mesh, one.places_m, np.array(COLOURS[of]))
+        name = f"{one.optics}_{number}"
+        of = "background" if one.optics == lit.scene.ground_optics else "plants"
+        meshes[of][name] = (one.mesh, one.places_m, np.array(COLOURS[of]))
         nodes = [name]
         if one.places_m is not None:
             nodes = [f"{name}_{place}" for place in range(len(one.places_m))]
-        kinds[of] += [(node, one.optics) for node in nodes]
-    background["flat"] = (_flat_ground(lit.scene), None, np.array(COLOURS["background"]))
-    kinds["background"].append(("flat", lit.scene.ground_optics))
-    gltf.write(folder / "plants.gltf", plants)
-    gltf.write(folder / "background.gltf", background)
-    gltf.write(folder / "sensors.gltf", _plates(lit.sensors, lit.aperture_m))
-    for of, rows in kinds.items():
-        table = pd.DataFrame(rows, columns=["id", "material"])
-        tables.write(folder / f"spectral_{of}.csv", table, digits=None)
-    tables.write(
-        folder / "scale_plants.csv",
-        pd.DataFrame({"id": [name for name, _ in kinds["plants"]], "plant": 1}),
-        digits=None,
+        materials[of] |= dict.fromkeys(nodes, one.optics)
+    meshes["background"]["flat"] = (
+        _flat_ground(lit.scene),
+        None,
+        np.array(COLOURS["background"]),
     )
+    materials["background"]["flat"] = lit.scene.ground_optics
+    meshes["sensors"] = _plates(lit.sensors, lit.aperture_m)
+    for of, nodes_of in meshes.items():
+        gltf.write(folder / f"{of}.gltf", nodes_of)
+    for of, of_node in materials.items():
+        table = pd.DataFrame(of_node.items(), columns=["id", "material"])
+        tables.write(folder / f"spectral_{of}.csv", table, digits=None)
+    scale = pd.DataFrame({"id": list(materials["plants"]), "plant": 1})
+    tables.write(folder / "scale_plants.csv", scale, digits=None)
     for band, name in enumerate(lit.bands_nm):
         rows = pd.DataFrame(-_to_gltf(lit.sky.direction), columns=["x", "y", "z"])
         rows["luminance"] = lit.sky.radiance[:, band]
@@ -172,15 +174,13 @@ def _flat_ground(scene: Scene) -> Mesh:
     return Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32), np.zeros(2, np.int32))
 
 
-def _plates(
-    sensors: pd.DataFrame, aperture_m: float
-) -> dict[str, tuple[Mesh, np.ndarray | None, np.ndarray]]:
+def _plates(sensors: pd.DataFrame, aperture_m: float) -> Nodes:
     """A square plate for each sensor, as large as its disc."""
     half = 0.5 * max(POINT_M, np.sqrt(np.pi / 4.0) * aperture_m)
     facing = facing_of(sensors)
     upright = np.tile([0.0, 0.0, 1.0], (len(sensors), 1)) if facing is None else facing
     faces, one = np.array([[0, 1, 2], [0, 2, 3]], np.int32), np.zeros(2, np.int32)
-    plates = {}
+    plates: Nodes = {}
     centres = sensors[POSITION].to_numpy(np.float64)
     for name, centre, normal in zip(sensors["sensor"], centres, upright, strict=True):
         first, second = half * across(normal)

@@ -178,10 +178,10 @@ def _sensors(path: Path, facts: dict) -> tuple[pd.DataFrame, float]:
             area = mesh.triangle_area_m2
             centre = area @ mesh.vertices_m[mesh.faces].mean(axis=1) / area.sum()
             normal = mesh.triangle_normal.sum(axis=0)
-            tilt, azimuth = angles_from_direction(normal / np.linalg.norm(normal))
-            if np.cos(np.radians(tilt)) > LEVEL:
-                tilt, azimuth = 0.0, 0.0
-            rows.append([node, *centre, float(tilt), float(azimuth)])
+            tilt_deg, azimuth_deg = map(float, angles_from_direction(normal))
+            if np.cos(np.radians(tilt_deg)) > LEVEL:
+                tilt_deg = azimuth_deg = 0.0
+            rows.append([node, *centre, tilt_deg, azimuth_deg])
             areas.append(area.sum())
     table = pd.DataFrame(rows, columns=["sensor", *POSITION, "tilt_deg", "azimuth_deg"])
     return table, float(np.sqrt(4.0 * np.mean(areas) / np.pi))

@@ -92,6 +92,10 @@ class Optics:
             {name: change(values) for name, values in self.transmittance.items()},
         )
 
+    def of_band(self, band: int) -> "Optics":
+        """The same surfaces in one band alone."""
+        return self.each(lambda values: values[band : band + 1])
+
     def with_black(self, name: str) -> "Optics":
         """The same, but one surface reflects nothing."""
         black = {name: np.zeros(len(self))}

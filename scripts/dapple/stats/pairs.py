@@ -151,8 +151,13 @@ def measured(records: pd.DataFrame) -> xr.DataArray:
     records : DataFrame
         As `pair` gives it; every reconstruction has the same measurements.
     """
-    one = records[records["reconstruction"] == records["reconstruction"].iloc[0]]
-    wide = one.pivot(index="sensor", columns="time", values="measured")
+    return of_sensors(records, records["reconstruction"].iloc[0], "measured")
+
+
+def of_sensors(records: pd.DataFrame, reconstruction: str, column: str) -> xr.DataArray:
+    """A column of the records of one reconstruction, as (sensor, time)."""
+    one = records[records["reconstruction"] == reconstruction]
+    wide = one.pivot(index="sensor", columns="time", values=column)
     when = pd.to_datetime(wide.columns, utc=True).tz_localize(None).to_numpy()
     coords = {"sensor": wide.index.to_numpy(str), "time": when}
     return xr.DataArray(wide.to_numpy(), coords, ("sensor", "time"))

@@ -48,7 +48,7 @@ def _said(value: float) -> dict[str, float]:
     return {"value": value, "factor": math.exp(min(value, 700.0))}
 
 
-MORE_SCANS = "Scan from more positions, spread evenly around the tree; `survey_next` proposes them."
+MORE_SCANS = "Scan from more positions, spread evenly around the tree: `snakemake -- survey_next`."
 DENSER = "Scan with a smaller angular step or from nearer."
 FEWER_POLYGONS = f"Set polygons.voxel_size_m to auto. {DENSER}"
 COARSER = "Take larger voxels, or scan with a smaller angular step."

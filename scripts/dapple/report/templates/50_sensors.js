@@ -10,6 +10,8 @@ charts.sensors = (figure, data) => {
   const series = element(canvas, "div", { role: "img", "aria-label": "Series of a sensor" });
   const simulated = light(data.simulated);
   const recorded = data.records ? light(data.records.par) : [];
+  const low = data.bounds ? light(data.bounds.low) : [];
+  const high = data.bounds ? light(data.bounds.high) : [];
   const n = data.sensors.length, t = data.times.length;
   const state = { sensor: 0, by: 0, name: data.first };
 
@@ -52,17 +54,17 @@ charts.sensors = (figure, data) => {
     });
   }
 
-  function band(line) {
-    const interval = data.interval && data.interval[state.name];
-    if (!interval) return [];
-    const middle = line.map((value) => interval.intercept + interval.slope * value);
-    const edge = (sign) => middle.map((value) => Math.max(value + sign * interval.half, 0));
-    const flat = { type: "scatter", mode: "lines", hoverinfo: "skip", line: { width: 0 } };
+  function band() {
+    if (!data.bounds) return [];
+    const times = data.records.times, at = state.name * n + state.sensor;
+    const flat = {
+      type: "scatter", mode: "lines", hoverinfo: "skip", line: { width: 0 }, x: times,
+    };
     return [
-      { ...flat, x: data.times, y: edge(-1), showlegend: false },
+      { ...flat, y: own(low, times.length, at), showlegend: false },
       {
-        ...flat, x: data.times, y: edge(1), fill: "tonexty", fillcolor: "rgba(120,120,120,0.16)",
-        name: "95 % of records",
+        ...flat, y: own(high, times.length, at), fill: "tonexty",
+        fillcolor: "rgba(120,120,120,0.16)", name: "90 % of records",
       },
     ];
   }
@@ -81,7 +83,7 @@ charts.sensors = (figure, data) => {
         line: { color: "#1a1a1a", width: 1 }, marker: { size: 4, color: "#1a1a1a" },
       });
     }
-    draw(series, [...band(traces[state.name].y), ...traces], {
+    draw(series, [...band(), ...traces], {
       height: 380, margin: { l: 60, r: 15, t: 60, b: 60 },
       xaxis: {
         title: { text: `sensor ${plain(data.sensors[state.sensor])}, time (${data.timezone})` },
