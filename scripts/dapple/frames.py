@@ -144,6 +144,18 @@ def local_to_less3(xyz_m: np.ndarray, corner_m: np.ndarray) -> np.ndarray:
     return np.stack([x, -y, z], axis=-1)
 
 
+def local_to_gltf(xyz_m: np.ndarray) -> np.ndarray:
+    """Local (east, north, up) to the axes of glTF: x east, y up, z south."""
+    x, y, z = np.moveaxis(np.asarray(xyz_m, float), -1, 0)
+    return np.stack([x, z, -y], axis=-1)
+
+
+def gltf_to_local(xyz_m: np.ndarray) -> np.ndarray:
+    """Vectors (..., 3) in the axes of glTF to local (east, north, up)."""
+    x, y, z = np.moveaxis(np.asarray(xyz_m, float), -1, 0)
+    return np.stack([x, -z, y], axis=-1)
+
+
 def local_to_dart(xyz_m: np.ndarray) -> np.ndarray:
     """Local (east, north, up) to the vertex order of DART's OBJ files: v (y, z, x).
 

@@ -10,6 +10,7 @@ import trimesh
 from dapple.errors import InputError
 from dapple.formats.atomic import atomic
 from dapple.formats.meshes import Mesh
+from dapple.frames import gltf_to_local, local_to_gltf
 
 
 def write(
@@ -40,10 +41,10 @@ def write(
         )
         visual = trimesh.visual.TextureVisuals(material=material)
         geometry = trimesh.Trimesh(
-            _turned(mesh.vertices_m), mesh.faces, process=False, visual=visual
+            local_to_gltf(mesh.vertices_m), mesh.faces, process=False, visual=visual
         )
         places = np.zeros((1, 3)) if places_m is None else places_m
-        for number, place in enumerate(_turned(places)):
+        for number, place in enumerate(local_to_gltf(places)):
             move = np.eye(4)
             move[:3, 3] = place
             node = name if places_m is None else f"{name}_{number}"
@@ -81,7 +82,7 @@ def read(path: str | Path) -> dict[str, Mesh]:
             continue
         moved = trimesh.transform_points(geometry.vertices, move)
         faces = np.asarray(geometry.faces, np.int32)
-        found[str(node)] = Mesh(_back(moved), faces, np.zeros(len(faces), np.int32))
+        found[str(node)] = Mesh(gltf_to_local(moved), faces, np.zeros(len(faces), np.int32))
     if not found:
         raise InputError(path, "no triangles", "meshes", "Export it with its geometry.")
     return found
@@ -90,15 +91,3 @@ def read(path: str | Path) -> dict[str, Mesh]:
 def _by_number(name: str) -> list[tuple[int, str]]:
     """Sorts names so that 2 comes before 10."""
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]
-
-
-def _turned(xyz_m: np.ndarray) -> np.ndarray:
-    """East, north, up to east, up, south."""
-    x, y, z = np.asarray(xyz_m, np.float64).T
-    return np.stack([x, z, -y], axis=1)
-
-
-def _back(xyz_m: np.ndarray) -> np.ndarray:
-    """East, up, south to east, north, up."""
-    x, y, z = np.asarray(xyz_m, np.float64).T
-    return np.stack([x, -z, y], axis=1)

@@ -17,7 +17,12 @@ import xarray as xr
 from dapple.errors import InputError
 from dapple.formats import gltf, json, tables
 from dapple.formats.meshes import Mesh
-from dapple.frames import across, angles_from_direction, direction_from_angles
+from dapple.frames import (
+    across,
+    angles_from_direction,
+    direction_from_angles,
+    local_to_gltf,
+)
 from dapple.scene.facing import facing_of
 from dapple.scene.point_sky import PointSky, even_points, with_sun
 from dapple.scene.scene_optics import Optics
@@ -128,7 +133,7 @@ def write(folder: Path, lit: LitScene, description: str) -> None:
     scale = pd.DataFrame({"id": list(materials["plants"]), "plant": 1})
     tables.write(folder / "scale_plants.csv", scale, digits=None)
     for band, name in enumerate(lit.bands_nm):
-        rows = pd.DataFrame(-_to_gltf(lit.sky.direction), columns=["x", "y", "z"])
+        rows = pd.DataFrame(-local_to_gltf(lit.sky.direction), columns=["x", "y", "z"])
         rows["luminance"] = lit.sky.radiance[:, band]
         tables.write(folder / f"sky_{name}.csv", rows, digits=None)
     json.write(folder / "scene.json", _facts(lit, description))
@@ -189,8 +194,3 @@ def _plates(sensors: pd.DataFrame, aperture_m: float) -> Nodes:
         )
         plates[str(name)] = (Mesh(corners, faces, one), None, np.array(COLOURS["sensors"]))
     return plates
-
-
-def _to_gltf(direction: np.ndarray) -> np.ndarray:
-    x, y, z = direction.T
-    return np.stack([x, z, -y], axis=1)

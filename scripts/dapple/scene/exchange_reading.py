@@ -10,7 +10,7 @@ import pandas as pd
 from dapple.errors import InputError
 from dapple.formats import gltf, json
 from dapple.formats.meshes import Mesh, concatenate
-from dapple.frames import angles_from_direction
+from dapple.frames import angles_from_direction, gltf_to_local
 from dapple.scene.exchange import FLAT_M, LitScene
 from dapple.scene.point_sky import PointSky
 from dapple.scene.scene_optics import Optics
@@ -200,8 +200,7 @@ def _sky(path: Path, facts: dict, bands: Mapping[str, tuple[float, float]]) -> P
             raise InputError(
                 path.parent / named[band], "other columns", "x y z luminance", "Write it so."
             )
-        x, y, z = values[:, :3].T
-        towards = np.stack([x, -z, y], axis=1)
+        towards = gltf_to_local(values[:, :3])
         towards /= np.linalg.norm(towards, axis=1, keepdims=True)
         # the way that light travels, or the way to where it comes from: all are of one kind
         directions.append(towards * np.sign(np.median(towards[:, 2])))
