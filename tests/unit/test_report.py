@@ -98,6 +98,21 @@ def test_what_is_not_known_is_the_reason_where_no_signal_raised_the_alarm():
     assert "Polygons are doubtful: nobody knows." in sentences(verdict, None)
 
 
+def test_a_small_loss_that_is_doubted_says_what_is_not_known(tmp_path):
+    verdict = judged(polygons="amber", surfels="amber")
+    verdict["reconstructions"]["polygons"]["expected_loss"] = 0.1
+    verdict["unknown"] = [{"lacks": "shots", "text": "nobody knows", "help": "Export pulses."}]
+    page = written(tmp_path, {"verdict.json": verdict})
+    assert page.count("Doubted for what is not known: nobody knows.") == 1
+
+
+def test_commands_are_set_as_such_and_stay_escaped():
+    page = document("t", [], [Section("s", [Text([f"Type `make run` or {EVIL} or `{EVIL}`."])])])
+    assert "<code>make run</code>" in page
+    assert EVIL not in page
+    assert "`" not in page.split("</header>")[-1].split("<script")[0]
+
+
 def test_records_choose_among_what_may_be_used_and_the_scan_says_what_it_has_against_it():
     verdict = judged(polygons="amber", voxels_1="green", surfels="red")
     first, *others = sentences(verdict, overall(truth=1, surfels=50, polygons=100, voxels_1=300))

@@ -17,7 +17,7 @@ KNOWN = "truth"
 LOSS = (
     "Expected loss tells how wrong the light may be: 0 is as good as in an undisturbed virtual "
     "world, 1 is failure (a fifth of r lost, or the error doubled). From its alarm on, a "
-    "reconstruction is doubted."
+    "reconstruction is doubted, and below it where something is not known that might raise it."
 )
 RECORDS_ALONE = (
     "Wrong sensor positions and clocks leave no trace in a scan: only records show them."
@@ -113,8 +113,8 @@ def blocks(verdict: Mapping[str, Any]) -> list[Block]:
     for name in sorted(judged, key=lambda name: judged[name]["expected_loss"]):
         facts = judged[name]
         score = f"Expected loss {facts['expected_loss']:.2f}, alarm from {facts['alarm']:.2f}."
-        if name == "surfels":
-            score += " Judged by the signs of polygons, which are rebuilt from the same points."
+        if facts["state"] == "amber" and facts["expected_loss"] < facts["alarm"]:
+            score += f" Doubted for what is not known: {verdict['unknown'][0]['text']}."
         if facts["state"] == "green" and facts["reasons"]:
             score += " What speaks most against it is still usual:"
         reasons = [f"{_capital(_reason(one))}. {one['help']}" for one in facts["reasons"]]
