@@ -46,6 +46,7 @@ coverage: setup
 peers: setup
 	$(BIN)/snakemake --cores $(CORES) -- results/virtual-apple/scan/shots.parquet
 	$(BIN)/python benchmarks/peers.py virtual-apple
+	$(BIN)/python benchmarks/peers_rami.py
 
 # A small experiment twice, with one core and with two; ARGUMENTS=--write renews docs/data/checksums.csv.
 reproduce: setup

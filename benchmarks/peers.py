@@ -56,6 +56,8 @@ class Peer:
     wheel: str
     also: tuple[str, ...]
     script: str
+    needs_all: bool = False
+    """False: its wheels ask for viewers that nothing here needs, and only those named are taken."""
 
     @property
     def python(self) -> Path:
@@ -71,10 +73,10 @@ class Peer:
             capture_output=True, text=True,
         )  # fmt: skip
         if made.returncode == 0:
-            # The wheels ask for viewers that no traversal needs.
+            alone = [] if self.needs_all else ["--no-deps"]
             made = subprocess.run(
                 [
-                    uv, "pip", "install", "-q", "--python", str(self.python), "--no-deps",
+                    uv, "pip", "install", "-q", "--python", str(self.python), *alone,
                     "--only-binary", ":all:", self.wheel, *self.also,
                 ],
                 capture_output=True, text=True,

@@ -40,11 +40,14 @@ charts.ground = (figure, data) => {
 
   function show(k) {
     const [x, y] = sun(k);
+    const narrow = canvas.clientWidth < 600;
+    const title = { text: PAR, side: narrow ? "bottom" : "right" };
+    const bar = narrow ? { orientation: "h", y: -0.2, yanchor: "top" } : {};
     const traces = [
       {
         type: "heatmap", x: data.x_m, y: data.y_m, z: map(k), zmin: 0, zmax: data.top,
         colorscale: COLOURS, hovertemplate: `%{z} ${PAR}<extra></extra>`,
-        colorbar: { title: { text: PAR, side: "right" }, thickness: 12 },
+        colorbar: { title, thickness: 12, ...bar },
       },
       {
         type: "scatter", mode: "markers", x: data.sensor_x_m, y: data.sensor_y_m,
@@ -56,7 +59,6 @@ charts.ground = (figure, data) => {
         marker: { size: 22, symbol: "circle", color: "#ff9d00", line: { color: "#222", width: 1.5 } },
       },
     ];
-    const narrow = canvas.clientWidth < 600;
     draw(canvas, traces, {
       height: narrow ? 420 : 560, showlegend: false,
       xaxis: { title: { text: "east [m]" }, range: [low[0], high[0]], constrain: "domain" },
