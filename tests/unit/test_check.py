@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 import yaml
-from tests.unit.test_cloud_readers import las
+from tests.unit.test_las_readers import las
 from tests.unit.test_plot import plot, tree
 
 from dapple import findings

@@ -9,7 +9,8 @@ import pye57
 import pyproj
 import pytest
 from pye57 import libe57
-from tests.unit.test_cloud_readers import XYZ, described, las, ply_text
+from tests.unit.test_cloud_readers import ply_text
+from tests.unit.test_las_readers import XYZ, described, las
 
 from dapple.cloud import voxel_groups
 from dapple.errors import EmptyCloudError, InputError
