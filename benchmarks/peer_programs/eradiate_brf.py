@@ -34,14 +34,14 @@ def experiment(given):
             }
         ],
     )
-    target = dict(zip(("xmin", "xmax", "ymin", "ymax"), np.repeat(cell[:2], 2), strict=True))
-    target = {name: float(x) * (-0.5 if name.endswith("min") else 0.5) for name, x in target.items()}
+    east, north = (float(length) / 2 for length in cell[:2])
+    target = {"xmin": -east, "xmax": east, "ymin": -north, "ymax": north, "z": float(cell[2])}
     view = {
         "type": "mdistant",
         "construct": "hplane",
         "zeniths": given["view_zenith"] * unit.deg,
         "azimuth": 0.0 * unit.deg,
-        "target": {"type": "rectangle", "z": float(cell[2]), **target},
+        "target": {"type": "rectangle"} | target,
         "srf": {"type": "delta", "wavelengths": 850.0},
     }
     sun = {"type": "directional", "zenith": float(given["sun_zenith"]) * unit.deg}
