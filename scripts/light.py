@@ -8,6 +8,7 @@ from dapple.light import (
     placed_light,
     series,
     sun_files,
+    tiles,
     transport_files,
 )
 from dapple.light.light_model import Model, Tracing
@@ -24,22 +25,28 @@ def main(snakemake):
     sky, optics = netcdf.read(inputs.sky), scene_optics.read(inputs.optics)
     table = tables.read(inputs.sensors)
     model = Model(**(json.read(inputs.model) if inputs.model else {"bands": len(optics)}))
-    tracing = Tracing(**params.tracing)
+    tracing, tiling = Tracing(**params.tracing), tiles.Tiling(**params.tiles)
 
     def trace(some):
         placements = []
         for number, leaves in enumerate(inputs.leaves):
-            scene = traced.load(scene_files.read([leaves], inputs.wood, around)[0], params.variant)
-            where, seed = some[sensors.POSITION].to_numpy(), stream_seed(params.seed, number)
-            of_some = {"facing": facing_of(some), "keys": by_sensor.keys(some), "seed": seed}
-            placements.append(steps.sun(scene, where, sky, model, tracing, **of_some))
+            scene = scene_files.read([leaves], inputs.wood, around)[0]
+            seed = stream_seed(params.seed, number)
+
+            def see(part, few, seed=seed):
+                where, loaded = few[sensors.POSITION].to_numpy(), traced.load(part, params.variant)
+                own = {"facing": facing_of(few), "keys": by_sensor.keys(few), "seed": seed}
+                seen = steps.sun(loaded, where, sky, model, tracing, **own)
+                return sun_files.Suns.from_placements([seen])
+
+            placements += tiles.by_tile(scene, some, tiling, seed, see).placements
         return sun_files.Suns.from_placements(placements)
 
     files = [*inputs.leaves, inputs.wood, *inputs.code]
     files += [path for path in (inputs.ground, inputs.shade) if path]
     identities = by_sensor.identities(
         table, files, model.sun, model.step_min, tracing, params.ground_z_m,
-        params.variant, params.seed, netcdf.times(sky).asi8, towards_sun(sky),
+        params.variant, params.seed, tiling, netcdf.times(sky).asi8, towards_sun(sky),
     )  # fmt: skip
     known = by_sensor.former(snakemake.output.sun, sun_files.read)
     suns = by_sensor.completed(identities, known, table, trace)

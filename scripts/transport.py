@@ -2,7 +2,7 @@
 
 from dapple import steps
 from dapple.formats import json, tables
-from dapple.light import by_sensor, transport_files
+from dapple.light import by_sensor, tiles, transport_files
 from dapple.light.light_model import Model, Tracing
 from dapple.scene import scene_files, scene_optics, sensors, traced
 from dapple.scene.facing import facing_of
@@ -16,11 +16,11 @@ def main(snakemake):
     table = tables.read(inputs.sensors)
     sensors.check(table, scene.filled, where=params.sensor_table)
     model = Model(**(json.read(inputs.model) if inputs.model else params.model))
-    tracing = Tracing(**params.tracing)
+    tracing, tiling = Tracing(**params.tracing), tiles.Tiling(**params.tiles)
 
-    def trace(some):
+    def trace(part, some):
         return steps.paths(
-            traced.load(scene, params.variant),
+            traced.load(part, params.variant),
             some[sensors.POSITION].to_numpy(),
             model,
             tracing,
@@ -36,10 +36,13 @@ def main(snakemake):
     files += [path for path in (inputs.ground, inputs.shade) if path]
     identities = by_sensor.identities(
         table, files, model.sky_patches, model.max_orders, tracing,
-        params.ground_z_m, params.variant, params.seed,
+        params.ground_z_m, params.variant, params.seed, tiling,
     )  # fmt: skip
     known = by_sensor.former(snakemake.output.transport, transport_files.read)
-    counted = by_sensor.completed(identities, known, table, trace)
+    counted = by_sensor.completed(
+        identities, known, table,
+        lambda some: tiles.by_tile(scene, some, tiling, params.seed, trace),
+    )  # fmt: skip
     started = counted.n_paths * counted.n_replicates
     print(f"{started.min()} to {started.max()} paths a sensor, {counted.cut.sum()} given up")
     transport_files.write(snakemake.output.transport, counted, identities)

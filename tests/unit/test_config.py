@@ -178,7 +178,10 @@ CONTRADICTIONS = {
     "spectra": [
         ({"optics": {"bark": {"wavelength_nm": [400.0, 500.0, 700.0]}}}, "3 wavelengths"),
     ],
-    "light": [({"light": {"engine": "timestep", "model": "advised"}}, "light.model: advised")],
+    "light": [
+        ({"light": {"engine": "timestep", "model": "advised"}}, "light.model: advised"),
+        ({"light": {"engine": "timestep", "tiles": {"size_m": 20}}}, "light.tiles.size_m: 20"),
+    ],
     "sensors": [
         ({"sensors": {"tilt_deg": 30}}, "no `sensors.azimuth_deg`"),
         (

@@ -64,6 +64,7 @@ KEYS = {
     # A grid stands in the tree's own frame, but files of light tell world coordinates.
     "registration={origin_m: [1, 0, 0]}": f"light*5 reference*5 agreement {MAP} {COMPARED}",
     "light={transport: {max_orders: 8}}": f"transport*5 light*5 agreement {COMPARED}",
+    "light={tiles: {size_m: 10}}": f"transport*5 light*5 agreement {COMPARED}",
     "light={transport: {max_shadow_rays: 99}}": f"light*5 agreement {COMPARED}",
     "light={timestep: {replicates: 5}}": checked(5),
     "light={timestep: {step_min: 120}}": "timesteps*5 reference*5 agreement",

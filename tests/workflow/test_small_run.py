@@ -13,7 +13,7 @@ import rasterio
 import xarray as xr
 import yaml
 from plotly.offline import get_plotlyjs
-from tests.workflow.project import copy_of_project
+from tests.workflow.project import copy_of_project, jobs
 
 from dapple.config.settings import validate
 
@@ -253,6 +253,18 @@ def test_a_fault_of_the_per_timestep_engine_reaches_the_agreement(small_run, tmp
     agreement = pd.read_csv(project.result("statistics/agreement.csv"), index_col=0)
     assert list(agreement.index) == ["polygons", "voxels_1.0"]
     assert (agreement["bias_rel"] > 0.02).all()
+
+
+def test_light_in_tiles_is_that_of_the_whole_scene_within_its_error(small_run, tmp_path):
+    project = small_run.clone(tmp_path / "tiles")
+    target = project.result("light/truth.nc").relative_to(project.folder)
+    done = project.run(target, config=["light={tiles: {size_m: 1, lowest_sun_deg: 40}}"])
+    assert jobs(done) >= {"transport", "light"}
+    assert "tiles of 1 m" in project.result("logs/transport/truth/0.log").read_text()
+    whole, tiled = (xr.load_dataset(run.result("light/truth.nc")) for run in (small_run, project))
+    assert list(whole["sensor"].values) == list(tiled["sensor"].values)
+    difference = np.abs(tiled["par_umol_m2_s"] - whole["par_umol_m2_s"])
+    assert (difference <= 4 * whole["standard_error_umol_m2_s"] + 1e-6).all()
 
 
 # The same bytes

@@ -198,13 +198,21 @@ def spectra(settings: Settings, where: str) -> None:
 
 
 def light(settings: Settings, where: str) -> None:
-    """The advice is about the transport engine; LESS has sensors that are plates."""
+    """Advice and tiles are for the transport engine; LESS has sensors that are plates."""
     if settings.light.model == "advised" and settings.light.engine != "transport":
         raise InputError(
             where,
             f"`light.model: advised` and `light.engine: {settings.light.engine}`",
             "`light.engine: transport`, which the advice is about",
             "Choose the transport engine or `light.model: full`.",
+        )
+    if settings.light.tiles.size_m and settings.light.engine != "transport":
+        raise InputError(
+            where,
+            f"`light.tiles.size_m: {settings.light.tiles.size_m:g}` and "
+            f"`light.engine: {settings.light.engine}`",
+            "`light.engine: transport`, which alone traces tiles",
+            "Choose the transport engine or `light.tiles.size_m: 0`.",
         )
     engines = (settings.light.engine, *settings.light.check_with)
     if "less" in engines and settings.sensors.response != "cosine":

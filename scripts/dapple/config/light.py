@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-from annotated_types import Ge, Gt, Le
+from annotated_types import Ge, Gt, Le, Lt
 
 from dapple.config.base import Count, NotNegative, Positive, Section, key
 from dapple.sky.solar_disc import SUN_DIAMETER_DEG
@@ -29,6 +29,20 @@ class Transport(Section):
     max_orders: Annotated[int, Ge(0), Le(255)] = key(12, "most surfaces on a path")
     sun_kernel_deg: Positive = key(
         8.0, "angle around the sun over which scattered paths are averaged"
+    )
+
+
+class Tiles(Section):
+    """The transport engine over a wide scene: far from a sensor, few triangles stand for many."""
+
+    size_m: NotNegative = key(0.0, "side of the tiles that are traced one by one; 0: no tiles")
+    lowest_sun_deg: Annotated[float, Gt(0), Lt(90)] = key(
+        10.0, "down to this height of the sun all that casts shadow into a tile is kept as it is"
+    )
+    far_triangle_m: Positive = key(
+        0.5,
+        "length of the triangles that stand for smaller ones farther away",
+        "Cook et al. 2007",
     )
 
 
@@ -79,6 +93,7 @@ class Light(Section):
         0.0, "standard deviation, east and north, by which leaves move within a record"
     )
     transport: Transport = Transport()
+    tiles: Tiles = Tiles()
     timestep: Timestep = Timestep()
     less: Less = Less()
 
