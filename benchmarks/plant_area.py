@@ -1,18 +1,19 @@
 """Do intervals of plant area hold the truth in as many cases as they say?
 
-    python benchmarks/plant_area.py learn         constants of structure/plant_area.py, on 40 crowns
+    python benchmarks/plant_area.py learn         constants of structure/plant_area.py and
+                                                  docs/data/plant_area_sizes.csv, on 120 crowns
     python benchmarks/plant_area.py judge         docs/data/plant_area{,_crowns}.csv, on 60 others
-    python benchmarks/plant_area.py sizes         docs/data/plant_area_sizes.csv, on those of the 40
-                                                  that at least four positions scanned
 
 Crowns are discs in a ball, evenly or in clumps, scanned from one to eight places with beams that
-have no width. The true area of a voxel is that of the parts of discs that lie in it. Ten of the
-judged crowns are scanned once more with beams as wide as a scanner's: no interval knows of those.
+have no width. The true area of a voxel is that of the parts of discs that lie in it. Voxels of
+0.2 m are not told the area of a disc, those of 0.1 m are; to learn, every size is done both ways.
+Ten of the judged crowns are scanned once more with beams as wide as a scanner's: no interval knows
+of those.
 """
 
 import argparse
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -29,14 +30,18 @@ from dapple.structure.voxel_sums import Grid  # noqa: E402
 from dapple.structure.voxels import plant_area_density  # noqa: E402
 from dapple.virtual import scanner  # noqa: E402
 
-LEARNED, JUDGED = range(40), range(2000, 2060)
+LEARNED, JUDGED = range(120), range(2000, 2060)
 WIDE = range(2000, 2010)
-SIZE_M, FILL_RANGE_M, MOST_DISCS, PARTS = 0.2, 0.5, 12_000, 48
+FILL_RANGE_M, MOST_DISCS, PARTS = 0.5, 12_000, 48
 CLUMP_DISCS, CLUMP_M = 20, 0.08
-SIZES_M, MOST_DENSITY = (0.2, 0.1), 4.0
-"""Sizes that are compared, and the cap of density times size [m² m⁻²]."""
-ENOUGH_SHOTS = 30
-"""Median over voxels that are entered at all, below which they are too small for a scan."""
+USUAL = ((0.2, False), (0.1, True))
+"""Edge of voxels [m], and whether they are told the area of a disc."""
+BOTH = ((0.2, False), (0.2, True), (0.1, False), (0.1, True))
+MOST_DENSITY = 4.0
+"""Cap of density times size [m² m⁻²]."""
+ENOUGH_SHOTS, MOST_FILLED = 30, 0.1
+"""Median over voxels that are entered at all, below which they are too small for a scan; share of
+the area in filled voxels, above which a crown says little of what seen voxels hide."""
 
 
 def crown(rng: np.random.Generator) -> tuple[np.ndarray, float]:
@@ -75,7 +80,8 @@ def area_by_voxel(discs: np.ndarray, voxels: xr.Dataset) -> np.ndarray:
     parts = parts + (out * np.sin(turn))[:, None] * along[:, None]
     places = discs[:, None, 1:4] + discs[:, 0, None, None] * parts
     shape = tuple(voxels.sizes[axis] for axis in "xyz")
-    index = np.floor((places.reshape(-1, 3) - voxels.attrs["corner_m"]) / SIZE_M).astype(int)
+    size_m = voxels.attrs["voxel_size_m"]
+    index = np.floor((places.reshape(-1, 3) - voxels.attrs["corner_m"]) / size_m).astype(int)
     flat = np.ravel_multi_index(tuple(np.clip(index, 0, np.array(shape) - 1).T), shape)
     area = np.repeat(np.pi * discs[:, 0] ** 2 / PARTS, PARTS)
     return np.bincount(flat, area, int(np.prod(shape))).reshape(shape)
@@ -105,64 +111,40 @@ def bounds_m(discs: np.ndarray) -> np.ndarray:
     return np.array([vertices_m.min(axis=0), vertices_m.max(axis=0)])
 
 
-def scanned(seed: int, *, is_wide: bool = False) -> tuple[xr.Dataset, np.ndarray, float, int]:
-    """Voxels of a crown, their true areas, area of an element [m²] and number of positions."""
+def compared(
+    seed: int, sizes: Iterable[tuple[float, bool]], *, is_wide: bool = False
+) -> pd.DataFrame:
+    """Estimated and true areas of the voxels, layers and the whole of a crown, by size."""
     shots, discs, element_m2, positions = fired(seed, is_wide=is_wide)
-    grid = Grid.around(bounds_m(discs), SIZE_M)
-    voxels = plant_area_density(shots, grid, contact_voxel_m=0, max_pad_m2_m3=20.0)
-    return voxels, area_by_voxel(discs, voxels), element_m2, positions
+    rows = []
+    for size_m, is_told in sizes:
+        voxels = plant_area_density(
+            shots,
+            Grid.around(bounds_m(discs), size_m),
+            contact_voxel_m=0,
+            max_pad_m2_m3=MOST_DENSITY / size_m,
+            single_leaf_area_m2=element_m2 if is_told else 0.0,
+        )
+        number = voxels["n_shots"].to_numpy()
+        facts = {
+            "size_m": size_m,
+            "has_leaf_area": is_told,
+            "crown": seed,
+            "positions": positions,
+            "element_m2": element_m2,
+            "median_shots": float(np.median(number[number > 0])),
+            "is_wide": is_wide,
+        }
+        rows.append(parts_of(voxels, area_by_voxel(discs, voxels), element_m2).assign(**facts))
+    return pd.concat(rows, ignore_index=True)
 
 
-def by_size(seed: int) -> Iterator[dict[str, float | bool]]:
-    """Relative error of a crown's area by voxels of several sizes, with and without leaf area."""
-    shots, discs, element_m2, positions = fired(seed)
-    true_m2 = float((np.pi * discs[:, 0] ** 2).sum())
-    for size_m in SIZES_M:
-        grid = Grid.around(bounds_m(discs), size_m)
-        for leaf_m2 in (0.0, element_m2):
-            voxels = plant_area_density(
-                shots,
-                grid,
-                contact_voxel_m=0,
-                max_pad_m2_m3=MOST_DENSITY / size_m,
-                single_leaf_area_m2=leaf_m2,
-            )
-            number = voxels["n_shots"].to_numpy()
-            yield {
-                "crown": seed,
-                "positions": positions,
-                "size_m": size_m,
-                "has_leaf_area": leaf_m2 > 0,
-                "median_shots": float(np.median(number[number > 0])),
-                "error": float(np.nansum(voxels["pad_fpl_m2_m3"]) * size_m**3 / true_m2 - 1),
-            }
-
-
-def positions_of(seed: int) -> int:
-    """Number of scan positions of a crown."""
-    rng = np.random.default_rng(seed)
-    crown(rng)
-    return int(rng.choice([1, 2, 3, 4, 6, 8]))
-
-
-def of_sizes(rows: pd.DataFrame) -> pd.DataFrame:
-    """Errors over crowns whose smallest voxels enough shots entered, by size and leaf area."""
-    rows = rows[rows.groupby("crown")["median_shots"].transform("min") >= ENOUGH_SHOTS]
-    found = rows.groupby(["size_m", "has_leaf_area"], sort=False)["error"]
-    return found.agg(
-        crowns="size",
-        mean="mean",
-        mean_absolute=lambda error: error.abs().mean(),
-        within_3_percent=lambda error: (error.abs() <= 0.03).mean(),
-    ).reset_index()
-
-
-def compared(seed: int, *, is_wide: bool = False) -> pd.DataFrame:
-    """Estimated and true areas of the voxels, layers and the whole of a crown."""
-    voxels, true_m2, element_m2, positions = scanned(seed, is_wide=is_wide)
+def parts_of(voxels: xr.Dataset, true_m2: np.ndarray, element_m2: float) -> pd.DataFrame:
+    """Areas of voxels, layers and the crown, estimated and true."""
     found = plant_area.of_voxels(voxels, element_area_m2=element_m2, fill_range_m=FILL_RANGE_M)
     low_m2, high_m2 = plant_area.interval_m2(found.area_m2, found.variance_m4)
-    beams_m2 = 1.96 * voxels["standard_error_m2_m3"].to_numpy() * SIZE_M**3
+    size_m = voxels.attrs["voxel_size_m"]
+    beams_m2 = 1.96 * voxels["standard_error_m2_m3"].to_numpy() * size_m**3
     in_crown = (true_m2 > 0) | (found.area_m2 > 0)
     of_voxels = pd.DataFrame(
         {
@@ -173,15 +155,46 @@ def compared(seed: int, *, is_wide: bool = False) -> pd.DataFrame:
             "low_m2": low_m2[in_crown],
             "high_m2": high_m2[in_crown],
             "beams_alone": (np.abs(found.area_m2 - true_m2) <= beams_m2)[in_crown],
-            "by_beams_m4": (beams_m2[in_crown] / 1.96) ** 2,
         }
     )
     parts = plant_area.by_part(found)
     parts["true_m2"] = [true_m2.sum(), *true_m2.sum(axis=(0, 1))]
+    seen_m2 = np.where(found.is_filled, 0.0, found.area_m2)
+    parts["area_per_face"] = (seen_m2**2).sum() / max(seen_m2.sum(), 1e-300) / size_m**2
     parts = parts[parts["true_m2"] > 0].drop(columns="height_m")
-    rows = pd.concat([of_voxels, parts], ignore_index=True)
-    facts = {"crown": seed, "positions": positions, "element_m2": element_m2, "is_wide": is_wide}
-    return rows.assign(**facts)
+    return pd.concat([of_voxels, parts], ignore_index=True)
+
+
+def constants(rows: pd.DataFrame) -> dict[str, float]:
+    """HIDDEN, LARGE and UNTOLD of structure/plant_area.py by least squares over whole crowns."""
+    crowns = rows[(rows["part"] == "crown") & rows["is_dense"]]
+    crowns = crowns[crowns["filled_share"] < MOST_FILLED]
+    of_leaf = crowns["element_m2"] / crowns["size_m"] ** 2
+    terms = np.column_stack(
+        [crowns["area_per_face"], -of_leaf, -of_leaf.where(~crowns["has_leaf_area"], 0.0)]
+    )
+    hidden = crowns["true_m2"] / crowns["plant_area_m2"] - 1
+    found = np.linalg.lstsq(terms, hidden.to_numpy(), rcond=None)[0]
+    return dict(zip(("HIDDEN", "LARGE", "UNTOLD"), found.round(3).tolist(), strict=True))
+
+
+def of_sizes(rows: pd.DataFrame) -> pd.DataFrame:
+    """Errors over crowns that at least four positions scanned densely, by size and leaf area."""
+    crowns = rows[(rows["part"] == "crown") & (rows["positions"] >= 4)]
+    dense = crowns[crowns.groupby("crown")["is_dense"].transform("all")]
+    dense = dense.assign(error=dense["plant_area_m2"] / dense["true_m2"] - 1)
+    found = dense.groupby(["size_m", "has_leaf_area"], sort=False)["error"]
+    return found.agg(
+        crowns="size",
+        mean="mean",
+        mean_absolute=lambda error: error.abs().mean(),
+        within_3_percent=near,
+    ).reset_index()
+
+
+def near(error: pd.Series) -> float:
+    """Share of relative errors within 3 %."""
+    return float((error.abs() <= 0.03).mean())
 
 
 def coverage(rows: pd.DataFrame) -> pd.DataFrame:
@@ -189,57 +202,62 @@ def coverage(rows: pd.DataFrame) -> pd.DataFrame:
     held = (rows["true_m2"] >= rows["low_m2"] - 1e-9) & (rows["true_m2"] <= rows["high_m2"] + 1e-9)
     rows = rows.assign(held=held, width=(rows["high_m2"] - rows["low_m2"]) / rows["plant_area_m2"])
     thin = rows[~rows["is_wide"]]
+    dense = thin[thin["is_dense"]]
     groups = {
         "all": thin,
-        "1 position": thin[thin["positions"] == 1],
-        "2 or 3 positions": thin[thin["positions"].isin([2, 3])],
-        "4 to 8 positions": thin[thin["positions"] >= 4],
+        "few shots a voxel": thin[~thin["is_dense"]],
+        "1 position": dense[dense["positions"] == 1],
+        "2 or 3 positions": dense[dense["positions"].isin([2, 3])],
+        "4 to 8 positions": dense[dense["positions"] >= 4],
         "beams with a width": rows[rows["is_wide"]],
     }
     found = []
     for name, group in groups.items():
-        for part, own in group.groupby("part"):
-            estimates = own[["plant_area_m2", "likely_m2"]]
-            near = (estimates.div(own["true_m2"], axis=0) - 1).abs().le(0.03).mean()
+        for (part, size_m), own in group.groupby(["part", "size_m"], sort=False):
+            error = own[["plant_area_m2", "likely_m2"]].div(own["true_m2"], axis=0) - 1
             found.append(
                 {
-                    "crowns": name,
                     "part": part,
+                    "size_m": size_m,
+                    "crowns": name,
                     "cases": len(own),
                     "coverage": own["held"].mean(),
                     "coverage_of_beams_alone": own["beams_alone"].astype(float).mean(),
                     "bias": own["plant_area_m2"].sum() / own["true_m2"].sum() - 1,
                     "bias_likely": own["likely_m2"].sum() / own["true_m2"].sum() - 1,
-                    "within_3_percent": near["plant_area_m2"],
-                    "likely_within_3_percent": near["likely_m2"],
+                    "within_3_percent": near(error["plant_area_m2"]),
+                    "likely_within_3_percent": near(error["likely_m2"]),
                     "median_width": own["width"].replace(np.inf, np.nan).median(),
                 }
             )
-    return pd.DataFrame(found)
+    order = ["part", "size_m"]
+    return pd.DataFrame(found).sort_values(order, ascending=[True, False], kind="stable")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=("learn", "judge", "sizes"))
+    parser.add_argument("what", choices=("learn", "judge"))
     parser.add_argument("--docs", type=Path, default=ROOT / "docs")
     options = parser.parse_args()
-    if options.what == "sizes":
-        many = [seed for seed in LEARNED if positions_of(seed) >= 4]
-        sizes = of_sizes(pd.DataFrame([row for seed in many for row in by_size(seed)]))
-        sizes.to_csv(options.docs / "data/plant_area_sizes.csv", index=False, float_format="%.4g")
-        print(sizes.to_string())
-        return
-    seeds = LEARNED if options.what == "learn" else JUDGED
-    rows = [compared(seed) for seed in seeds]
-    if options.what == "judge":
-        rows += [compared(seed, is_wide=True) for seed in WIDE]
+    folder = options.docs / "data"
+    learns = options.what == "learn"
+    rows = [compared(seed, BOTH if learns else USUAL) for seed in (LEARNED if learns else JUDGED)]
+    if not learns:
+        rows += [compared(seed, USUAL, is_wide=True) for seed in WIDE]
     rows = pd.concat(rows, ignore_index=True)
+    rows["is_dense"] = rows["median_shots"] >= ENOUGH_SHOTS
+    if learns:
+        print(constants(rows))
+        sizes = of_sizes(rows)
+        sizes.to_csv(folder / "plant_area_sizes.csv", index=False, float_format="%.4g")
+        print(sizes.to_string())
+        rows = rows[rows["has_leaf_area"] == (rows["size_m"] == USUAL[1][0])]
     table = coverage(rows)
     print(table.to_string())
-    if options.what == "judge":
-        crowns = rows[rows["part"] == "crown"].drop(columns=["part", "beams_alone", "by_beams_m4"])
-        table.to_csv(options.docs / "data/plant_area.csv", index=False, float_format="%.4g")
-        crowns.to_csv(options.docs / "data/plant_area_crowns.csv", index=False, float_format="%.4g")
+    if not learns:
+        crowns = rows[rows["part"] == "crown"].drop(columns=["part", "beams_alone", "is_dense"])
+        table.to_csv(folder / "plant_area.csv", index=False, float_format="%.4g")
+        crowns.to_csv(folder / "plant_area_crowns.csv", index=False, float_format="%.4g")
 
 
 if __name__ == "__main__":

@@ -85,6 +85,23 @@ def test_air_far_from_leaves_is_sure_and_a_capped_voxel_may_hold_twice_as_much()
     assert (high_m2[0] > 2 * made.area_m2[0]).all()
 
 
+def test_denser_voxels_hide_more_and_large_leaves_come_out_too_large_most_where_untold():
+    thin, dense = (found(voxels(np.full((3, 3, 3), density))) for density in (1.0, 4.0))
+    share = [(one.hidden_m2 / one.area_m2).mean() for one in (thin, dense)]
+    assert share[1] - share[0] == pytest.approx(plant_area.HIDDEN * 3.0 * 0.2)
+    assert (found(voxels(np.zeros((3, 3, 3)))).hidden_m2 == 0).all()
+    grid = voxels(np.ones((3, 3, 3)), size=0.1)
+    told = found(grid.assign_attrs(single_leaf_area_m2=LEAF_M2))
+    assert (told.hidden_m2 > found(grid).hidden_m2).all()
+
+
+def test_where_a_single_position_saw_nothing_more_is_hidden_than_where_four_did():
+    density = np.ones((5, 5, 5))
+    density[2, 2, 2] = np.nan
+    one, four = (found(voxels(density, 0.05, scans=scans)) for scans in (1, 4))
+    assert one.hidden_m2[2, 2, 2] == pytest.approx(4 * four.hidden_m2[2, 2, 2])
+
+
 def test_layers_add_up_to_the_crown_whose_interval_is_narrower_than_theirs():
     made = found(voxels(np.random.default_rng(1).uniform(0.5, 1.5, (6, 6, 6)), 0.2))
     parts = plant_area.by_part(made)

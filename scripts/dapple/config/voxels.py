@@ -21,7 +21,9 @@ from dapple.structure.pad_estimators import ESTIMATORS
 class Voxels(Section):
     """Plant area density."""
 
-    sizes_m: Some[Positive] = key((0.2, 1.0), "edges of the voxels", FREY)
+    sizes_m: Some[Positive] = key(
+        (0.2, 1.0), "edges of the voxels; 0.1 where plant area matters and the scan is dense", FREY
+    )
     estimator: Annotated[str, OneOf(ESTIMATORS)] = key(
         "fpl",
         ", ".join(f"{name}: {one.summary}" for name, one in ESTIMATORS.items()),

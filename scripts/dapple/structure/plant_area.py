@@ -25,12 +25,16 @@ OF_BEAMS = 1.15
 OF_PLACES, OF_TURNS = 0.04, 0.3
 """Variance by chance of where elements lie, and of how they turn to a single scan position, over
 area times an element's area."""
-LOST, OF_CROWN, OF_LAYER = 0.035, 0.02, 0.04
-"""Share of the area that clumps smaller than voxels hide from beams; its standard deviation between
-crowns, and between their layers."""
-LOST_BEHIND, OF_BEHIND = 0.07, 0.08
-"""Share that a single scan position loses besides, behind leaves, and its standard deviation; of n
-positions, the nth part."""
+HIDDEN = 0.088
+"""Share of a voxel's area that its leaves hide where they fill it in part, over area per face."""
+LARGE, UNTOLD, LARGEST = 0.167, 0.15, 0.5
+"""Share by which leaves that are large in voxels raise the area, over a leaf's area per face; by
+how much more where the estimator was not told the area of a leaf; and the largest area per face."""
+BEHIND, OF_BEHIND = 1.5, 1.5
+"""Share of filled voxels' area that a single scan position loses besides, behind leaves, and its
+standard deviation; of n positions, the nth part."""
+OF_CROWN, OF_LAYER = 0.015, 0.04
+"""Standard deviation between crowns, and between their layers, of the share that is hidden."""
 OF_FILL = 0.3
 """Correlation of the errors of voxels that were filled."""
 NEIGHBOURS = 16
@@ -46,6 +50,9 @@ class PlantArea:
     area_m2 : (nx, ny, nz) float64
         One-sided, estimated or filled from the neighbours; 0 outside of the crown.
     variance_m4 : (nx, ny, nz) float64
+    hidden_m2 : (nx, ny, nz) float64
+        What voxels like this one hide on average from the estimator; below 0 where leaves are
+        large in voxels.
     is_filled : (nx, ny, nz) bool
         Unknown to the scan, and filled from neighbours.
     height_m : (nz,) float64
@@ -56,6 +63,7 @@ class PlantArea:
 
     area_m2: np.ndarray
     variance_m4: np.ndarray
+    hidden_m2: np.ndarray
     is_filled: np.ndarray
     height_m: np.ndarray
     scans: int
@@ -81,6 +89,10 @@ def of_voxels(voxels: xr.Dataset, *, element_area_m2: float, fill_range_m: float
     angle of chance (for spherical angles, s·A/3 from one direction and less from several). A voxel
     at the cap may hold any more: its variance holds the distance to twice the cap. Variance of a
     filled one: that of its neighbours' areas among each other, and of their mean.
+
+    Beams that cross the empty part of a voxel count as if leaves had been there to meet: the more
+    leaves the other part holds, the more of them is hidden. Parts of one leaf do not hide each
+    other, so that leaves which are large in voxels come out too large.
     """
     data = voxels.transpose("x", "y", "z")
     size_m = float(data.attrs["voxel_size_m"])
@@ -112,8 +124,13 @@ def of_voxels(voxels: xr.Dataset, *, element_area_m2: float, fill_range_m: float
         area_m2[tuple(filled.T)] = mean_m2
         variance_m4[tuple(filled.T)] = spread_m4 * (1 + (weight**2).sum(axis=1)) + own_m4
     variance_m4[~known & ~is_filled] = 0.0
+    is_told = float(data.attrs.get("single_leaf_area_m2", 0.0)) > 0
+    of_leaves = LARGE if is_told else LARGE + UNTOLD
+    of_leaves *= min(element_area_m2 / size_m**2, LARGEST)
+    hidden_m2 = area_m2 * (HIDDEN * area_m2 / size_m**2 - of_leaves)
+    hidden_m2[is_filled] = BEHIND / scans * area_m2[is_filled]
     height_m = data["z"].to_numpy().astype(np.float64)
-    return PlantArea(area_m2, variance_m4, is_filled, height_m, scans)
+    return PlantArea(area_m2, variance_m4, hidden_m2, is_filled, height_m, scans)
 
 
 def interval_m2(area_m2: np.ndarray, variance_m4: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -172,15 +189,16 @@ def by_part(found: PlantArea) -> pd.DataFrame:
 
 
 def _summed(found: PlantArea, layers: slice, of_model: float) -> dict[str, float]:
-    area_m2, variance_m4, is_filled = (
-        one[:, :, layers] for one in (found.area_m2, found.variance_m4, found.is_filled)
+    area_m2, variance_m4, hidden_m2, is_filled = (
+        one[:, :, layers]
+        for one in (found.area_m2, found.variance_m4, found.hidden_m2, found.is_filled)
     )
     total_m2, filled_m2 = float(area_m2.sum()), float(area_m2[is_filled].sum())
     together_m4 = np.sqrt(variance_m4[is_filled]).sum() ** 2
     apart_m4 = (1 - OF_FILL) * variance_m4[is_filled].sum() + OF_FILL * together_m4
-    of_all = (of_model**2 + (OF_BEHIND / found.scans) ** 2) * total_m2**2
+    of_all = (of_model * total_m2) ** 2 + (OF_BEHIND / found.scans * filled_m2) ** 2
     variance = variance_m4[~is_filled].sum() + apart_m4 + of_all
-    likely_m2 = (1 + LOST + LOST_BEHIND / found.scans) * total_m2
+    likely_m2 = total_m2 + float(hidden_m2.sum())
     low, high = interval_m2(np.array(likely_m2), np.array(variance))
     return {
         "plant_area_m2": total_m2,
