@@ -1,23 +1,30 @@
 """Polygons and surfels against the true leaves of the default tree, by the step of the scan.
 
     python benchmarks/surfels.py [--steps 0.12 0.08 0.05 0.04] [--seed 1] [--docs docs]
+    python benchmarks/surfels.py --angles        docs/data/surfels_angles.csv
 
 Grows the tree of the default configuration, scans, cleans, classifies and rebuilds it, and traces
 the share of the sun's disc that sensors see at the times of the default run. Errors are those of
 this share; partial shade is where the true share lies between 5 % and 95 %. Constants of surfels
 were chosen on trees of other seeds (docs/data/surfels.csv). Rows of other steps stay in the table.
+
+With `--angles` the small tree of the stability map is rebuilt with leaves that lie flat or stand,
+and the area of discs beside leaves of each inclination is compared with that of these leaves.
 """
 
 import argparse
 import sys
 import time
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 import pandas as pd
 import xarray as xr
+import yaml
+from scipy.spatial import cKDTree
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
@@ -36,9 +43,12 @@ from dapple.structure.stem import stem_position
 from dapple.virtual import scanner
 from dapple.virtual.plants import apple_tree
 
+STABILITY = Path(__file__).parents[1] / "config/stability.yaml"
 TOLERANCE, MOST_RAYS = 0.01, 4096
 """Of the share of the sun's disc, and rays for it."""
 LIT, SHADED = 0.95, 0.05
+ANGLES = ("spherical", "uniform", "plagiophile", "erectophile", "planophile")
+INCLINATIONS_DEG = (0, 15, 30, 45, 60, 90)
 
 
 def main() -> None:
@@ -46,7 +56,14 @@ def main() -> None:
     parser.add_argument("--steps", type=float, nargs="+", default=[0.12, 0.08, 0.05, 0.04])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--docs", type=Path, default=Path(__file__).parents[1] / "docs")
+    parser.add_argument("--angles", action="store_true")
     options = parser.parse_args()
+    if options.angles:
+        rows = pd.DataFrame([row for angles in ANGLES for row in by_inclination(angles)])
+        path = options.docs / "data" / "surfels_angles.csv"
+        rows.to_csv(path, index=False, float_format="%.4g")
+        print(rows.to_string())
+        return
     settings = Settings(seed=options.seed)
     plant = apple_tree(**settings.plant.model_dump(), seed=stream_seed(options.seed, "plant"))
     true = {"leaf": plant.leaves, "wood": plant.wood}
@@ -57,7 +74,7 @@ def main() -> None:
     rows = []
     for step_deg in options.steps:
         for row in rebuilt(true, step_deg, settings):
-            meshes = row.pop("meshes")
+            meshes, _ = row.pop("meshes"), row.pop("facts", None)
             seen, seconds = sunlit(meshes, settings, plant.wood)
             row |= {
                 "leaf_area_m2": meshes["leaf"].area_m2,
@@ -96,7 +113,7 @@ def rebuilt(true: dict[str, Mesh], step_deg: float, settings: Settings) -> Itera
         yield {"reconstruction": "polygons", "meshes": polygons, "cpu_s": took_s}
         for name, fired in (("surfels", shots.iterate(path)), ("surfels without shots", None)):
             begun = time.process_time()
-            leaves, _ = steps.surfels(
+            leaves, facts = steps.surfels(
                 cloud,
                 fired,
                 seed=stream_seed(settings.seed, "surfels"),
@@ -105,9 +122,43 @@ def rebuilt(true: dict[str, Mesh], step_deg: float, settings: Settings) -> Itera
             )
             took_s = time.process_time() - begun
             meshes = polygons | {"leaf": leaves}
-            yield {"reconstruction": name, "meshes": meshes, "cpu_s": took_s}
+            yield {"reconstruction": name, "meshes": meshes, "cpu_s": took_s, "facts": facts}
         meshes = polygons | {"leaf": true["leaf"]}
         yield {"reconstruction": "true leaves", "meshes": meshes, "cpu_s": 0.0}
+
+
+def by_inclination(angles: str) -> Iterator[dict]:
+    """Area of surfels over that of the true leaves, by the leaves' inclination and of all."""
+    settings = Settings.model_validate(yaml.safe_load(STABILITY.read_text()))
+    plant = settings.plant.model_dump() | {"leaf_angle_distribution": angles}
+    plant = apple_tree(**plant, seed=stream_seed(settings.seed, "plant"))
+    true = {"leaf": plant.leaves, "wood": plant.wood}
+    made = rebuilt(true, settings.scan.angular_step_deg, settings)
+    row = next(row for row in made if row["reconstruction"] == "surfels")
+    discs, facts = row["meshes"]["leaf"], row["facts"]
+    corner_m = plant.leaves.vertices_m[plant.leaves.faces]
+    inside_m = 0.5 * (corner_m + corner_m.mean(axis=1, keepdims=True))
+    _, nearest = cKDTree(inside_m.reshape(-1, 3)).query(
+        discs.vertices_m[discs.faces].mean(axis=1), workers=2
+    )
+    normal, area_m2 = plant.leaves.triangle_normal, plant.leaves.triangle_area_m2
+    upright = np.abs(normal[:, 2]) / np.linalg.norm(normal, axis=1)
+    group = np.digitize(np.degrees(np.arccos(upright.clip(0, 1))), INCLINATIONS_DEG[1:-1])
+    number = len(INCLINATIONS_DEG) - 1
+    true_m2 = np.bincount(group, area_m2, number)
+    found_m2 = np.bincount(group[nearest // 3], discs.triangle_area_m2, number)
+    names = [f"{a} to {b}" for a, b in pairwise(INCLINATIONS_DEG)]
+    groups = zip(
+        [*names, "all"], [*true_m2, true_m2.sum()], [*found_m2, found_m2.sum()], strict=True
+    )
+    for name, of_true_m2, of_found_m2 in groups:
+        yield {
+            "inclination_deg": name,
+            "leaf_angles": angles,
+            "true_m2": of_true_m2,
+            "found": of_found_m2 / of_true_m2,
+            "edge_on_share": facts["edge_on_share"] if name == "all" else np.nan,
+        }
 
 
 def classified(path: Path, settings: Settings) -> clouds.Cloud:

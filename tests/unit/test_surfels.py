@@ -145,6 +145,15 @@ def test_all_shots_that_meet_a_disc_are_found():
     assert abs(count - expected) <= 1  # directions are kept in single precision
 
 
+def test_a_sheet_that_is_seen_at_grazing_angles_alone_is_told_to_be_edge_on():
+    above, beside = (
+        rebuilt(sheet(), shots_down(lambda k: (0.0,), position_m=np.array(place)))[1]
+        for place in ((0.0, 0.0, 4.0), (4.0, 0.0, 1.0))
+    )
+    assert above["edge_on_share"] < 0.02
+    assert beside["edge_on_share"] > 0.95
+
+
 def test_points_alone_have_discs_turned_by_chance():
     lonely = np.random.default_rng(1).uniform(0, 10, (400, 3))
     leaves, facts = rebuilt(lonely)

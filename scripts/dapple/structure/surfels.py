@@ -29,6 +29,8 @@ BEAM_SHARE = 0.5
 """A target must reach this far into the beam to end it, as a share of the beam's radius."""
 LARGEST = 1.5
 """Largest radius, in medians of all radii: points that stand alone say little of an area."""
+EDGE_ON = 0.5
+"""Largest cosine of incidence at which a scanner sees a surface edge on: 30° to it."""
 SIDES = 4
 """Of the polygons that discs are drawn as, equal in area."""
 
@@ -84,7 +86,8 @@ def reconstruct(
     facts : dict
         `reach_m`, `point_spacing_m` (median, of the thinned points), `with_shots`,
         `without_surface` (share of discs whose direction is chance), `shots_per_disc` (sum of
-        their weights) and `hit_share` (means; None without shots).
+        their weights), `hit_share` (means) and `edge_on_share` (of the discs' area, what every scan
+        position sees edge on; all three None without shots).
 
     Raises
     ------
@@ -117,6 +120,7 @@ def reconstruct(
         "without_surface": float(is_alone.mean()),
         "shots_per_disc": None,
         "hit_share": None,
+        "edge_on_share": None,
     }
     if known is not None:
         beam = np.array([beam_diameter_m, 1e-3 * beam_divergence_mrad]) * 0.5 * BEAM_SHARE
@@ -126,10 +130,24 @@ def reconstruct(
         share = np.where(np.isnan(share), 1.0, share)
         facts |= {"shots_per_disc": float(weight.mean()), "hit_share": float(share.mean())}
         radius *= np.sqrt(share)
+        facts["edge_on_share"] = _edge_on_share(centre, normal, radius, known.position_m)
     discs = np.column_stack([radius, centre, normal])
     del centre, normal
     is_there = radius > 0
     return meshes.of_discs(discs if is_there.all() else discs[is_there], SIDES), facts
+
+
+def _edge_on_share(
+    centre: np.ndarray, normal: np.ndarray, radius: np.ndarray, position_m: np.ndarray
+) -> float:
+    """Share of the area of discs that no scan position sees at more than 30° to its surface."""
+    best = np.zeros(len(centre))
+    for place_m in position_m:
+        to = place_m - centre
+        cosine = np.abs(np.einsum("nk,nk->n", to, normal)) / np.linalg.norm(to, axis=1)
+        np.maximum(best, cosine, out=best)
+    area = radius**2
+    return float(area[best < EDGE_ON].sum() / max(area.sum(), 1e-300))
 
 
 def _reach_m(points_m: np.ndarray, spacings: float, noise_m: float) -> float:
