@@ -30,8 +30,8 @@ from dapple.structure.voxel_sums import Grid  # noqa: E402
 from dapple.structure.voxels import plant_area_density  # noqa: E402
 from dapple.virtual import scanner  # noqa: E402
 
-LEARNED, JUDGED = range(120), range(2000, 2060)
-WIDE = range(2000, 2010)
+LEARNED, JUDGED = range(120), range(3000, 3060)
+WIDE = range(3000, 3010)
 FILL_RANGE_M, MOST_DISCS, PARTS = 0.5, 12_000, 48
 CLUMP_DISCS, CLUMP_M = 20, 0.08
 USUAL = ((0.2, False), (0.1, True))
