@@ -115,15 +115,26 @@ def test_a_clear_sky_follows_the_standard_of_the_cie(zenith_deg, azimuth_deg, su
     assert found.item() == pytest.approx(expected, rel=1e-6)
 
 
-# Two rows of Table 1 of Perez, Seals and Michalsky (1993), written down a second time.
+# Table 1 of Perez, Seals and Michalsky (1993), written down a second time: below a clearness of
+# each range x1 to x4 of a, b, c, d and e.
 PUBLISHED = {
-    2.3: ([-0.6, -0.3566, -2.5, 2.325], [0.2937, 0.0496, -5.6812, 1.8415],
-          [21.0, -4.7656, -21.5906, 7.2492], [-3.5, -0.1554, 1.4062, 0.3988],
-          [0.0032, 0.0766, -0.0656, -0.1294]),
-    7.5: ([-1.05, 0.0289, 0.426, 0.359], [-0.325, 0.1156, 0.7781, 0.0025],
-          [31.0625, -14.5, -46.1148, 55.375], [-7.2312, 0.405, 13.35, 0.6234],
-          [1.5, -0.6426, 1.8564, 0.5636]),
-}  # fmt: skip
+    1.03: """1.3525 -.2576 -.269 -1.4366  -.767 .0007 1.2734 -.1233  2.8 .6004 1.2375 1
+             1.8734 .6297 .9738 .2809  .0356 -.1246 -.5718 .9938""",
+    1.1: """-1.2219 -.773 1.4148 1.1016  -.2054 .0367 -3.9128 .9156  6.975 .1774 6.4477 -.1239
+            -1.5798 -.5081 -1.7812 .108  .2624 .0672 -.219 -.4285""",
+    1.4: """-1.1 -.2515 .8952 .0156  .2782 -.1812 -4.5 1.1766  24.7219 -13.0812 -37.7 34.8438
+            -5 1.5218 3.9229 -2.6204  -.0156 .1597 .4199 -.5562""",
+    1.7: """-.5484 -.6654 -.2672 .7117  .7234 -.6219 -5.6812 2.6297  33.3389 -18.3 -62.25 52.0781
+            -3.5 .0016 1.1477 .1062  .4659 -.3296 -.0876 -.0329""",
+    2.3: """-.6 -.3566 -2.5 2.325  .2937 .0496 -5.6812 1.8415  21 -4.7656 -21.5906 7.2492
+            -3.5 -.1554 1.4062 .3988  .0032 .0766 -.0656 -.1294""",
+    3.5: """-1.0156 -.367 1.0078 1.4051  .2875 -.5328 -3.85 3.375  14 -.9999 -7.1406 7.5469
+            -3.4 -.1078 -1.075 1.5702  -.0672 .4016 .3017 -.4844""",
+    5.5: """-1 .0211 .5025 -.5119  -.3 .1922 .7023 -1.6317  19 -5 1.2438 -1.9094
+            -4 .025 .3844 .2656  1.0468 -.3788 -2.4517 1.4656""",
+    7.5: """-1.05 .0289 .426 .359  -.325 .1156 .7781 .0025  31.0625 -14.5 -46.1148 55.375
+            -7.2312 .405 13.35 .6234  1.5 -.6426 1.8564 .5636""",
+}
 
 
 @pytest.mark.parametrize("clearness", PUBLISHED)
@@ -135,8 +146,13 @@ def test_the_sky_of_perez_has_the_coefficients_of_the_published_table(clearness)
         Conditions(*(np.array([x]) for x in (40.0, 180.0, beam, diffuse, outside)))
     )[0]
     brightness = diffuse / outside * pvlib.atmosphere.get_relative_airmass(40.0)
-    expected = [x1 + x2 * zenith + brightness * (x3 + x4 * zenith)
-                for x1, x2, x3, x4 in PUBLISHED[clearness]]  # fmt: skip
+    table = np.array(PUBLISHED[clearness].split(), float).reshape(5, 4)
+    expected = table @ [1.0, zenith, brightness, brightness * zenith]
+    if clearness < 1.065:
+        (c1, c2, c3, c4), (d1, d2, d3, d4) = table[2:4]
+        expected[2] = np.exp((brightness * (c1 + c2 * zenith)) ** c3) - c4
+        expected[3] = -np.exp(brightness * (d1 + d2 * zenith)) + d3 + brightness * d4
+    expected[1] = min(expected[1], 0.0)
     np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
