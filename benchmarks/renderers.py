@@ -3,8 +3,10 @@
     python benchmarks/renderers.py MITSUBA_RUN LESS_RUN [--plot larch] [--results results]
 
 The runs differ in `chlorophyll.world.renderer` alone. Writes `renderers.csv`: mean reflectance of
-the plot by band, and root mean square difference and correlation of cells of 3 m, and, where both
-runs have retrieved chlorophyll, `renderers_retrieval.csv`: its errors on the field trees.
+the plot by band, and root mean square difference and correlation of cells of 3 m;
+`renderers_cost.csv`: processor time and memory of the images; and, where both runs have retrieved
+chlorophyll, `renderers_retrieval.csv`: its errors on the field trees. Rows of plots of another edge
+stay.
 """
 
 import argparse
@@ -31,13 +33,16 @@ def cells(raster: rasters.Raster) -> np.ndarray:
     return parts.mean(axis=(2, 4)).reshape(len(whole), -1)
 
 
-def of_images(folders: list[Path], plot: str) -> pd.DataFrame:
+def images_of(folders: list[Path], plot: str) -> list[rasters.Raster]:
+    """Of each run."""
+    return [rasters.read(folder / f"plots/{plot}/world/images.tif") for folder in folders]
+
+
+def of_images(images: list[rasters.Raster]) -> pd.DataFrame:
     """A row a band."""
-    images = [rasters.read(folder / f"plots/{plot}/world/images.tif") for folder in folders]
     mitsuba, less = (cells(image) for image in images)
     return pd.DataFrame(
         {
-            "plot": plot,
             "band": images[0].bands,
             "mitsuba": mitsuba.mean(axis=1),
             "less": less.mean(axis=1),
@@ -48,9 +53,19 @@ def of_images(folders: list[Path], plot: str) -> pd.DataFrame:
     )
 
 
+def of_cost(folders: list[Path], plot: str) -> pd.DataFrame:
+    """A row a renderer: what its images took, the reading and writing of files included."""
+    found = []
+    for renderer, folder in zip(("mitsuba", "less"), folders, strict=True):
+        taken = pd.read_csv(folder / f"benchmarks/uav_images_{plot}.tsv", sep="\t").iloc[0]
+        row = {"cpu_s": float(taken["cpu_time"]), "memory_mb": float(taken["max_rss"])}
+        found.append({"renderer": renderer} | row)
+    return pd.DataFrame(found)
+
+
 def of_retrieval(folders: list[Path], plot: str) -> pd.DataFrame:
     """A row a model, mask and network; empty where a run has retrieved nothing."""
-    keys = ["plot", "model", "mask", "network"]
+    keys = ["model", "mask", "network"]
     found = []
     for folder in folders:
         paths = sorted(folder.glob(f"plots/{plot}/retrieval/accuracy_*.csv"))
@@ -59,7 +74,18 @@ def of_retrieval(folders: list[Path], plot: str) -> pd.DataFrame:
         table = pd.concat([tables.read(path) for path in paths])
         chosen = (table["test_set"] == "field") & (table["seed"] == "mean")
         found.append(table[chosen].set_index(keys)[["n", "r2", "rmse", "bias"]])
-    return found[0].join(found[1], lsuffix="_mitsuba", rsuffix="_less").reset_index()
+    both = found[0].add_suffix("_mitsuba").join(found[1].add_suffix("_less"))
+    return both.reset_index()
+
+
+def write(path: Path, table: pd.DataFrame, edge_m: float) -> None:
+    """Rows of this edge in the place of former ones."""
+    table.insert(0, "edge_m", edge_m)
+    print(table.to_string(index=False))
+    if path.exists():
+        former = tables.read(path)
+        table = pd.concat([former[former["edge_m"] != edge_m], table], ignore_index=True)
+    tables.write(path, table)
 
 
 def main() -> None:
@@ -70,13 +96,15 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=ROOT / "docs/data")
     options = parser.parse_args()
     folders = [options.results / run for run in options.runs]
+    images = images_of(folders, options.plot)
+    edge_m = images[0].pixel_m * images[0].values.shape[-1]
     for name, table in (
-        ("renderers", of_images(folders, options.plot)),
+        ("renderers", of_images(images)),
+        ("renderers_cost", of_cost(folders, options.plot)),
         ("renderers_retrieval", of_retrieval(folders, options.plot)),
     ):
         if not table.empty:
-            print(table.to_string(index=False))
-            tables.write(options.output / f"{name}.csv", table)
+            write(options.output / f"{name}.csv", table, edge_m)
 
 
 if __name__ == "__main__":
