@@ -1,5 +1,6 @@
 """Sensors that are not level planes: what they read in the open, and that both engines agree."""
 
+import drjit
 import numpy as np
 import pytest
 import xarray as xr
@@ -20,6 +21,16 @@ ANGLES = np.arange(0.0, 91.0, 5.0)
 COSINE_IN_A_TABLE = tuple(zip(ANGLES.tolist(), np.cos(np.radians(ANGLES)).tolist(), strict=True))
 HALF_BOTH = tuple((angle, 0.5 + 0.5 * cosine) for angle, cosine in COSINE_IN_A_TABLE)
 """As a globe reads that sees only the upper hemisphere."""
+
+
+@pytest.mark.parametrize(
+    "response", [COSINE, HEMISPHERICAL, HALF_BOTH, ((0, 1), (60, 0.2), (90, 0))]
+)
+def test_engines_read_a_response_between_its_knots_as_numpy_does(response):
+    cosine = np.linspace(-0.2, 1.0, 25)
+    by_numpy = sensor_response.value(response, cosine)
+    by_drjit = [sensor_response.value(response, one, drjit) for one in cosine.tolist()]
+    np.testing.assert_allclose(by_drjit, by_numpy, atol=1e-12)
 
 
 def by_transport(scene, optics, response, n_paths=40_000):
