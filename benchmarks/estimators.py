@@ -22,7 +22,7 @@ import pandas as pd
 ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "scripts")]
 
-from benchmarks.plant_area import SIZE_M, area_by_voxel  # noqa: E402
+from benchmarks.plant_area import area_by_voxel  # noqa: E402
 
 from dapple.formats import meshes  # noqa: E402
 from dapple.formats.shots import Shots  # noqa: E402
@@ -33,7 +33,7 @@ from dapple.virtual import scanner  # noqa: E402
 INDICES = (0.5, 1.0, 2.0, 4.0, 8.0)
 CUBES = {0.01: 1, 0.03: 2, 0.08: 12, 0.15: 24}
 """By the size of leaves [m]."""
-STEP_DEG, MAX_DENSITY = 0.15, 40.0
+SIZE_M, STEP_DEG, MAX_DENSITY = 0.2, 0.15, 40.0
 EDGE_INDICES, EDGE_LEAF_M, EDGE_SEEDS = (2.0, 4.0, 8.0), 0.03, (101, 102)
 
 
