@@ -29,6 +29,17 @@ def row(cost, error, **facts):
     } | facts
 
 
+def test_names_of_ladders_that_end_low_stand_above_the_foot_of_the_axis():
+    sizes_m = np.arange(1, 13) / 10
+    rows = [row(1.0 + k, 0.9 - 0.07 * k, size_m=size, paths=1) for k, size in enumerate(sizes_m)]
+    rows += [row(20.0, 0.01, size_m=size, paths=2) for size in sizes_m]
+    figure = chart.draw(tradeoff.table(rows))
+    for axes in figure.axes:
+        heights = [text.xyann[1] for text in axes.texts]
+        assert len(heights) == len(sizes_m)
+        assert min(heights) > 0
+
+
 def test_the_front_is_what_no_other_point_beats_in_both():
     rng = np.random.default_rng(1)
     cost, error = rng.random((2, 200))

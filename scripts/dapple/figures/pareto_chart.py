@@ -122,6 +122,7 @@ def _panel(axes: Axes, points: pd.DataFrame, error: str) -> None:
     axes.set_xlim(low, high * (high / low) ** 0.33)
     low, high = axes.get_ylim()
     axes.set_ylim(low / (high / low) ** 0.18, high)
+    labels.sort(key=lambda one: -one[3])
     _label(axes, labels, points[["cost_s", error]].to_numpy())
 
 
@@ -137,32 +138,45 @@ def _ladder(own: pd.DataFrame) -> pd.DataFrame:
 
 
 def _label(axes: Axes, labels: list[tuple[str, str, float, float]], points: np.ndarray) -> None:
-    """Names at the dear end of every ladder, moved down to where nothing else is."""
-    to_axes = axes.transData + axes.transAxes.inverted()
-    taken = to_axes.transform(points)
-    placed: list[Any] = []
-    for label, colour, cost, error in sorted(labels, key=lambda one: -one[3]):
-        x, y = to_axes.transform((cost, error))
-        x += LABEL_SHIFT
-        right = x + LABEL_WIDTH
-        while (
-            (taken[:, 0] > x) & (taken[:, 0] < right) & (abs(taken[:, 1] - y) < LABEL_GAP / 2)
-        ).any() or any(
-            abs(other[2] - x) < LABEL_WIDTH and abs(other[3] - y) < LABEL_GAP for other in placed
-        ):
-            y -= LABEL_GAP / 4
-        placed.append((label, colour, x, y, cost, error))
-    for label, colour, x, y, cost, error in placed:
+    """Names at the dear end of every ladder, above the foot of an axis that is long enough."""
+    placed = _placed(axes, labels, points)
+    while min(y for _, y in placed) < LABEL_GAP:
+        low, high = axes.get_ylim()
+        axes.set_ylim(low / (high / low) ** 0.05, high)
+        placed = _placed(axes, labels, points)
+    for (label, colour, cost, error), place in zip(labels, placed, strict=True):
         axes.annotate(
             label,
             (cost, error),
-            xytext=(x, y),
+            xytext=place,
             textcoords=axes.transAxes,
             va="center",
             fontsize=7.5,
             color=colour,
             arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.4, "alpha": 0.6},
         )
+
+
+def _placed(
+    axes: Axes, labels: list[tuple[str, str, float, float]], points: np.ndarray
+) -> list[tuple[float, float]]:
+    """Where labels stand, in parts of the axes: moved down to where nothing else is."""
+    to_axes = axes.transData + axes.transAxes.inverted()
+    taken = to_axes.transform(points)
+    placed: list[tuple[float, float]] = []
+    for _, _, cost, error in labels:
+        x, y = to_axes.transform((cost, error))
+        x += LABEL_SHIFT
+        right = x + LABEL_WIDTH
+        while (
+            (taken[:, 0] > x) & (taken[:, 0] < right) & (abs(taken[:, 1] - y) < LABEL_GAP / 2)
+        ).any() or any(
+            abs(other_x - x) < LABEL_WIDTH and abs(other_y - y) < LABEL_GAP
+            for other_x, other_y in placed
+        ):
+            y -= LABEL_GAP / 4
+        placed.append((float(x), float(y)))
+    return placed
 
 
 def _legend(axes: Axes, engines: set[str]) -> None:
