@@ -39,7 +39,8 @@ SIZE = 0.5
 PLOTS = {30: (6.0, 24.0, 0.0, 30.0), 100: (20.0, 10.0, 40.0, 40.0)}
 """Sides of plots [m]; of their tiles [m], and down to which sun all is kept [°]; where a square of
 sensors begins, and its side [m]: of a hectare, four tiles in the middle, which see most."""
-TREE_TRIANGLES = 10_000
+TREE_TRIANGLES, FAR_TRIANGLE_M = 10_000, 0.5
+WHOLE = Tiling(0.0, 10.0, FAR_TRIANGLE_M)
 
 
 def plot(side_m: float, n_triangles: int) -> Scene:
@@ -110,7 +111,7 @@ def measured(side_m: int, tiling: Tiling, seed: int) -> tuple[dict[str, float], 
     """What a plot takes, and its light."""
     first, side = PLOTS[side_m][2:]
     # A tiny scene first: it loads the back end and compiles the kernels.
-    light(plot(SPACING_M, 100), sensors(SPACING_M, 2), Tiling(), seed=1)
+    light(plot(SPACING_M, 100), sensors(SPACING_M, 2), WHOLE, seed=1)
     scene, table = plot(side_m, TREE_TRIANGLES), sensors(side, 10, first)
     before = memory_mb("VmRSS")
     Path("/proc/self/clear_refs").write_text("5")  # forgets the peak so far
@@ -129,9 +130,9 @@ def measured(side_m: int, tiling: Tiling, seed: int) -> tuple[dict[str, float], 
 
 def compared(side_m: int) -> list[dict]:
     """A plot as a whole, in tiles, and as a whole with other rays: a row each."""
-    tiles = Tiling(*PLOTS[side_m][:2])
+    tiles = Tiling(*PLOTS[side_m][:2], FAR_TRIANGLE_M)
     rows, found = [], []
-    for way, tiling, seed in (("whole", Tiling(), 1), ("tiles", tiles, 1), ("rays", Tiling(), 2)):
+    for way, tiling, seed in (("whole", WHOLE, 1), ("tiles", tiles, 1), ("rays", WHOLE, 2)):
         with multiprocessing.get_context("spawn").Pool(1) as alone:
             row, light_of_way = alone.apply(measured, (side_m, tiling, seed))
         found.append(light_of_way)

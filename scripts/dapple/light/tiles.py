@@ -44,9 +44,9 @@ class Tiling:
     too, which leave a tile as rays do.
     """
 
-    size_m: float = 0.0
-    lowest_sun_deg: float = 10.0
-    far_triangle_m: float = 0.5
+    size_m: float
+    lowest_sun_deg: float
+    far_triangle_m: float
 
     def margin_m(self, scene: Scene, sensors: pd.DataFrame) -> float:
         """How far around a tile everything is kept: the longest shadow [m].
