@@ -1,7 +1,8 @@
 """Do intervals of plant area hold the truth in as many cases as they say?
 
     python benchmarks/plant_area.py learn         constants of structure/plant_area.py and
-                                                  docs/data/plant_area_sizes.csv, on 120 crowns
+                                                  docs/data/plant_area_{sizes,spread}.csv, on 120
+                                                  crowns
     python benchmarks/plant_area.py judge         docs/data/plant_area{,_crowns}.csv, on 60 others
 
 Crowns are discs in a ball, evenly or in clumps, scanned from one to eight places with beams that
@@ -37,6 +38,8 @@ CLUMP_DISCS, CLUMP_M = 20, 0.08
 USUAL = ((0.2, False), (0.1, True))
 """Edge of voxels [m], and whether they are told the area of a disc."""
 BOTH = ((0.2, False), (0.2, True), (0.1, False), (0.1, True))
+SPREADS = (0.01, 0.015, 0.02, 0.025, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08)
+"""Standard deviations between crowns or layers that may be chosen from."""
 MOST_DENSITY = 4.0
 """Cap of density times size [m² m⁻²]."""
 ENOUGH_SHOTS, MOST_FILLED = 30, 0.1
@@ -158,6 +161,9 @@ def parts_of(voxels: xr.Dataset, true_m2: np.ndarray, element_m2: float) -> pd.D
         }
     )
     parts = plant_area.by_part(found)
+    for spread in SPREADS:
+        other = plant_area.by_part(found, of_crown=spread, of_layer=spread)
+        parts[[f"low_m2 {spread}", f"high_m2 {spread}"]] = other[["low_m2", "high_m2"]]
     parts["true_m2"] = [true_m2.sum(), *true_m2.sum(axis=(0, 1))]
     seen_m2 = np.where(found.is_filled, 0.0, found.area_m2)
     parts["area_per_face"] = (seen_m2**2).sum() / max(seen_m2.sum(), 1e-300) / size_m**2
@@ -197,13 +203,17 @@ def near(error: pd.Series) -> float:
     return float((error.abs() <= 0.03).mean())
 
 
-def coverage(rows: pd.DataFrame) -> pd.DataFrame:
-    """Share of true areas within the intervals, by part and for some groups of crowns."""
-    held = (rows["true_m2"] >= rows["low_m2"] - 1e-9) & (rows["true_m2"] <= rows["high_m2"] + 1e-9)
-    rows = rows.assign(held=held, width=(rows["high_m2"] - rows["low_m2"]) / rows["plant_area_m2"])
+def is_held(rows: pd.DataFrame, spread: str = "") -> pd.Series:
+    """Whether the true area lies in the interval, as it is or with another spread."""
+    low_m2, high_m2 = rows[f"low_m2{spread}"], rows[f"high_m2{spread}"]
+    return (rows["true_m2"] >= low_m2 - 1e-9) & (rows["true_m2"] <= high_m2 + 1e-9)
+
+
+def groups_of(rows: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """Crowns that are told apart, by how they were scanned."""
     thin = rows[~rows["is_wide"]]
     dense = thin[thin["is_dense"]]
-    groups = {
+    return {
         "all": thin,
         "few shots a voxel": thin[~thin["is_dense"]],
         "1 position": dense[dense["positions"] == 1],
@@ -211,8 +221,25 @@ def coverage(rows: pd.DataFrame) -> pd.DataFrame:
         "4 to 8 positions": dense[dense["positions"] >= 4],
         "beams with a width": rows[rows["is_wide"]],
     }
+
+
+def of_spreads(rows: pd.DataFrame) -> pd.DataFrame:
+    """Share of true areas within the intervals that each spread between crowns or layers gives."""
     found = []
-    for name, group in groups.items():
+    for name, group in groups_of(rows[rows["part"].isin(["crown", "layer"])]).items():
+        for (part, size_m), own in group.groupby(["part", "size_m"], sort=False):
+            of_one = {"part": part, "size_m": size_m, "crowns": name, "cases": len(own)}
+            held = {spread: is_held(own, f" {spread}").mean() for spread in SPREADS}
+            found += [of_one | {"spread": one, "coverage": share} for one, share in held.items()]
+    return pd.DataFrame(found)
+
+
+def coverage(rows: pd.DataFrame) -> pd.DataFrame:
+    """Share of true areas within the intervals, by part and for some groups of crowns."""
+    width = (rows["high_m2"] - rows["low_m2"]) / rows["plant_area_m2"]
+    rows = rows.assign(held=is_held(rows), width=width)
+    found = []
+    for name, group in groups_of(rows).items():
         for (part, size_m), own in group.groupby(["part", "size_m"], sort=False):
             error = own[["plant_area_m2", "likely_m2"]].div(own["true_m2"], axis=0) - 1
             found.append(
@@ -252,10 +279,14 @@ def main() -> None:
         sizes.to_csv(folder / "plant_area_sizes.csv", index=False, float_format="%.4g")
         print(sizes.to_string())
         rows = rows[rows["has_leaf_area"] == (rows["size_m"] == USUAL[1][0])]
+        spreads = of_spreads(rows)
+        spreads.to_csv(folder / "plant_area_spread.csv", index=False, float_format="%.4g")
     table = coverage(rows)
     print(table.to_string())
     if not learns:
-        crowns = rows[rows["part"] == "crown"].drop(columns=["part", "beams_alone", "is_dense"])
+        others = [name for name in rows if name.startswith(("low_m2 ", "high_m2 "))]
+        dropped = ["part", "beams_alone", "is_dense", *others]
+        crowns = rows[rows["part"] == "crown"].drop(columns=dropped)
         table.to_csv(folder / "plant_area.csv", index=False, float_format="%.4g")
         crowns.to_csv(folder / "plant_area_crowns.csv", index=False, float_format="%.4g")
 

@@ -36,9 +36,10 @@ standard deviation; of n positions, the nth part."""
 OF_CROWN, OF_LAYER = 0.02, 0.05
 """Standard deviation between crowns, and between their layers, of the share that is hidden.
 
-Chosen by hand, in steps of 0.005 and 0.01, so that of the crowns learnt on, those scanned densely
-have `LEVEL` of their areas in the interval, to a per cent, in every group by number of positions.
-With voxels of 0.1 m two groups do not: crowns of one position (8 of 9) and of few shots (42 of 49).
+Chosen by hand from the table that `benchmarks/plant_area.py learn` makes, so that of the crowns
+learnt on, those scanned densely have `LEVEL` of their areas in the interval, to a per cent, in every
+group by number of positions. With voxels of 0.1 m two groups do not: crowns of one position (8 of 9)
+and of few shots (42 of 49).
 """
 OF_FILL = 0.3
 """Correlation of the errors of voxels that were filled."""
@@ -176,8 +177,16 @@ def as_dataset(found: PlantArea, voxels: xr.Dataset) -> xr.Dataset:
     return xr.Dataset(data, {axis: voxels[axis] for axis in "xyz"}, attrs)
 
 
-def by_part(found: PlantArea) -> pd.DataFrame:
+def by_part(
+    found: PlantArea, *, of_crown: float = OF_CROWN, of_layer: float = OF_LAYER
+) -> pd.DataFrame:
     """Plant area of every height layer and of the crown, with intervals.
+
+    Parameters
+    ----------
+    found : PlantArea
+    of_crown, of_layer : float
+        Standard deviation between crowns, and between their layers, of the share that is hidden.
 
     Returns
     -------
@@ -186,10 +195,10 @@ def by_part(found: PlantArea) -> pd.DataFrame:
         `plant_area_m2` as estimated, `likely_m2` with what crowns like this one hide, `low_m2`,
         `high_m2`, `filled_share` (of the area, what was filled).
     """
-    rows = [{"part": "crown", "height_m": np.nan} | _summed(found, slice(None), OF_CROWN)]
+    rows = [{"part": "crown", "height_m": np.nan} | _summed(found, slice(None), of_crown)]
     for k, height_m in enumerate(found.height_m.tolist()):
-        of_layer = _summed(found, slice(k, k + 1), OF_LAYER)
-        rows.append({"part": "layer", "height_m": height_m} | of_layer)
+        one = _summed(found, slice(k, k + 1), of_layer)
+        rows.append({"part": "layer", "height_m": height_m} | one)
     return pd.DataFrame(rows)
 
 
