@@ -94,6 +94,16 @@ def test_an_open_sky_of_radiance_one_gives_pi():
     assert error < 1e-12
 
 
+def test_directions_fill_a_patch_evenly_in_height_and_around():
+    uv = np.random.default_rng(1).random((4000, 2))
+    east, north, up = np.moveaxis(patches(145).sample(uv)[:-1], -1, 0)
+    around = north + 1j * east
+    turn = np.angle(around / around[:, :1])
+    related = [np.corrcoef(*one)[0, 1] for one in zip(up**2, turn, strict=True)]
+    assert np.abs(related).max() < 0.08
+    assert np.std(up**2, axis=1) == pytest.approx(np.ptp(up**2, axis=1) / np.sqrt(12), rel=0.05)
+
+
 def test_a_sky_seen_through_the_patches_keeps_its_cosine_weighted_integral():
     sky = patches(577)
     radiance = 1 + sky.directions[None, :, 2]

@@ -204,6 +204,7 @@ def test_a_turbid_crown_gets_its_plant_area_back_as_facets():
     assert found.leaves.area_m2 == pytest.approx(found.facts["leaf_area_m2"], abs=0.01)
     assert found.table.n_facets.sum() == found.leaves.n_elements
     np.testing.assert_allclose(found.table.plant_area_density_m2_m3, 1.0, rtol=0.15)
+    assert found.facts["plant_area_index"] == found.facts["leaf_area_m2"] / 12.0**2
     z = found.leaves.vertices_m[:, 2]
     assert z.min() > 4.9 - 0.1
     assert z.max() < 8.1 + 0.1

@@ -145,6 +145,25 @@ def test_all_shots_that_meet_a_disc_are_found():
     assert abs(count - expected) <= 1  # directions are kept in single precision
 
 
+def test_places_of_shots_on_a_disc_are_told_in_its_own_plane():
+    shots = shots_down(lambda k: (0.0,), position_m=np.array([2.0, -3.0, 1.5]))
+    index = shot_evidence.build([shots], 15.0)
+    centre, normal = np.array([0.05, 0.02, 0.0]), np.array([1.0, -2.0, 3.0]) / np.sqrt(14.0)
+    u, v, out = np.empty(3), np.empty(3), np.empty((999, 6))
+    shot_evidence.axes_in(normal, u, v)
+    made = shot_evidence.gather(index.arrays, centre, normal, u, v, 0.03, 1.0, out)
+    to = centre - shots.origin_m
+    reach = (to @ normal) / (shots.direction @ normal)
+    away = shots.origin_m + reach[:, None] * shots.direction - centre
+    near = np.linalg.norm(away, axis=1) < 0.03
+    expected = away[near] @ np.stack([u, v], axis=1)
+    found = out[:made, [shot_evidence.U, shot_evidence.V]]
+    for axis in (0, 1):
+        assert found[:, axis].min() == pytest.approx(expected[:, axis].min(), abs=1e-3)
+        assert found[:, axis].max() == pytest.approx(expected[:, axis].max(), abs=1e-3)
+    assert np.linalg.norm(found, axis=1).max() < 0.03 + 1e-6
+
+
 def test_a_sheet_that_is_seen_at_grazing_angles_alone_is_told_to_be_edge_on():
     above, beside = (
         rebuilt(sheet(), shots_down(lambda k: (0.0,), position_m=np.array(place)))[1]

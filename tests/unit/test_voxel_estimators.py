@@ -109,6 +109,13 @@ def test_a_leaf_that_could_fill_a_voxel_is_refused():
         plant_area_density(TWO_SHOTS, column(1), single_leaf_area_m2=1.2)
 
 
+def test_the_largest_leaf_throws_a_shadow_of_the_volume_of_a_voxel_over_its_diagonal():
+    voxel = Grid(np.zeros(3), (1, 1, 1), 0.5)
+    largest = 0.5**3 / (0.5 * np.sqrt(3)) / 0.5  # half of its area is seen on average
+    with pytest.raises(InputError, match=f"less than {largest:.2f} m²"):
+        plant_area_density(TWO_SHOTS, voxel, single_leaf_area_m2=0.3)
+
+
 def test_contact_frequency_counts_sub_voxels():
     shots = shots_of(
         np.array([[0.05, 0.05, -1], [0.05, 0.05, -1], [0.55, 0.55, -1]]),
