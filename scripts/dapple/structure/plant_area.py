@@ -37,9 +37,9 @@ OF_CROWN, OF_LAYER = 0.02, 0.05
 """Standard deviation between crowns, and between their layers, of the share that is hidden.
 
 Chosen by hand from the table that `benchmarks/plant_area.py learn` makes, so that of the crowns
-learnt on, those scanned densely have `LEVEL` of their areas in the interval, to a per cent, in every
-group by number of positions. With voxels of 0.1 m two groups do not: crowns of one position (8 of 9)
-and of few shots (42 of 49).
+learnt on, those scanned densely have `LEVEL` of their areas in the interval, to a per cent, in
+every group by number of positions. With voxels of 0.1 m two groups do not: crowns of one position
+(8 of 9) and of few shots (42 of 49).
 """
 OF_FILL = 0.3
 """Correlation of the errors of voxels that were filled."""
