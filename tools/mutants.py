@@ -44,7 +44,7 @@ SWAPS: dict[type[ast.AST], type[ast.AST]] = {
 MESSAGE = re.compile(r"raise |log\.|\w*Error\(|warnings\.")
 FAULT = ["module", "line", "fault"]
 # Seconds of a processor for the tests of one fault, as they took without it, and for one file.
-BUDGET_S, SLOW_S = 30, 15
+BUDGET_S, SLOW_S = 45, 25
 WAIT = 30  # seconds of the clock for one of a processor: what waits for nothing ends too
 AHEAD = ("scipy.optimize", "xarray", "pyarrow.parquet", "matplotlib.figure")
 
