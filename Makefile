@@ -38,9 +38,10 @@ format: setup
 	$(BIN)/snakefmt Snakefile rules
 
 # Lines that unit tests, closed forms and the jobs of small runs reach; tracing makes jobs slow.
+# Which test reached a line and how long each took stays for tools/mutants.py.
 coverage: setup
-	$(BIN)/python -m pytest -q -n $(CORES) --timeout 6000 --cov --cov-report=term \
-		tests/unit tests/physics tests/workflow/test_small_*.py
+	$(BIN)/python -m pytest -q -n $(CORES) --timeout 6000 --cov --cov-report=term --cov-context=test \
+		--junitxml=.coverage-tests.xml tests/unit tests/physics tests/workflow/test_small_*.py
 
 # Other programs on the shots of the default run, each in an environment of its own.
 peers: setup

@@ -1,14 +1,15 @@
 """Do tests notice? Small faults are put into the code, one at a time, and its tests are run.
 
+    make coverage
     PYTHONPATH=scripts .venv/bin/python tools/mutants.py [--count 100] [--seed 1] [--packages …]
 
 A fault swaps an operator, turns a comparison round, or changes a number or a truth value. Faults
 are drawn over all places of the packages where one is possible; left out are messages, annotations
-and decorators. The tests of a fault are those of tests/unit and tests/physics that import its
-module, then those that import a module that imports it, the quickest first and no slow ones. Each
-is run once without a fault before it is used: one that fails then tells nothing, and ends the run.
-Time is that of processors, so that a machine with other work chooses the same tests. Writes every
-fault to `--output` as it is judged; `why` of a row that stands there already is kept.
+and decorators. The tests of a fault are those of tests/unit and tests/physics that `make coverage`
+saw run its line. Compiled code runs where no line is seen, and constants are read but once: there
+it is those of test files that import the module, or a module that imports it. The quickest come
+first, as long as time is left.
+Writes every fault to `--output` as it is judged; `why` of a row that stands there already is kept.
 """
 
 import argparse
@@ -20,14 +21,15 @@ import multiprocessing
 import os
 import re
 import resource
-import signal
 import sys
 import tempfile
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import coverage
 import numba
 import numpy as np
 import pandas as pd
@@ -42,9 +44,10 @@ SWAPS: dict[type[ast.AST], type[ast.AST]] = {
     ast.In: ast.NotIn, ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.And: ast.Or, ast.Or: ast.And,
 }  # fmt: skip
 MESSAGE = re.compile(r"raise |log\.|\w*Error\(|warnings\.")
+PARTS = ("tests/unit", "tests/physics")
 FAULT = ["module", "line", "fault"]
-# Seconds of a processor for the tests of one fault, as they took without it, and for one file.
-BUDGET_S, SLOW_S = 45, 25
+TIMES = ROOT / ".coverage-tests.xml"
+BUDGET_S = 40  # for the tests of one fault, as they took when coverage was found
 WAIT = 30  # seconds of the clock for one of a processor: what waits for nothing ends too
 AHEAD = ("scipy.optimize", "xarray", "pyarrow.parquet", "matplotlib.figure")
 
@@ -87,35 +90,49 @@ def importing(module: str, paths: Iterator[Path]) -> list[Path]:
 
 
 @cache
-def tests_of(module: str) -> tuple[list[Path], list[Path]]:
-    """Test files that import a module, and those that import a module that does."""
-
-    def tests(name: str) -> set[Path]:
-        return {p for part in ("unit", "physics") for p in importing(name, tests_in(part))}
-
-    def tests_in(part: str) -> Iterator[Path]:
-        return ROOT.glob(f"tests/{part}/test_*.py")
-
-    own = tests(module)
-    users = importing(module, SCRIPTS.rglob("*.py"))
-    names = {".".join(path.relative_to(SCRIPTS).with_suffix("").parts) for path in users}
-    return sorted(own), sorted(set().union(*map(tests, names)) - own)
+def seconds() -> dict[str, float]:
+    """How long every test took that passed when coverage was found, by its name for pytest [s]."""
+    if not TIMES.exists():
+        sys.exit(f"{TIMES.name} is missing: run `make coverage` first")
+    found = {}
+    for case in ElementTree.parse(TIMES).iter("testcase"):
+        if not len(case):  # neither failed nor left out
+            file = case.attrib["classname"].replace(".", "/") + ".py"
+            found[f"{file}::{case.attrib['name']}"] = float(case.attrib["time"])
+    return {name: s for name, s in found.items() if name.startswith(PARTS)}
 
 
 @cache
-def without_fault_s(test: Path) -> float:
-    """Processor seconds of a test file as the code stands; without end if it is slow."""
-    begin = processor_s()
-    if code := exit_code((test,), None, SLOW_S):
-        sys.exit(f"{test.relative_to(ROOT)} ends with {code} without any fault: mend it first")
-    taken = processor_s() - begin
-    return np.inf if code is None or taken > SLOW_S else taken
+def tests_by_line(path: Path) -> dict[int, list[str]]:
+    """Tests that ran each line of a file, by their name for pytest and a part of theirs."""
+    data = coverage.CoverageData(str(ROOT / ".coverage"))
+    data.read()
+    return data.contexts_by_lineno(str(path))
 
 
-def processor_s() -> float:
-    """Processor time of all children that have ended [s]."""
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
+@cache
+def tests_by_import(module: str) -> frozenset[str]:
+    """Tests of files that import a module, or a module that imports it."""
+    users = importing(module, SCRIPTS.rglob("*.py"))
+    names = {".".join(path.relative_to(SCRIPTS).with_suffix("").parts) for path in users}
+    files = {
+        str(file.relative_to(ROOT))
+        for name in names | {module}
+        for part in PARTS
+        for file in importing(name, (ROOT / part).glob("test_*.py"))
+    }
+    return frozenset(name for name in seconds() if name.split("::")[0] in files)
+
+
+def tests_of(module: str, path: Path, lines: range, is_seen: bool) -> list[str]:
+    """Tests of a fault, the quickest first, as many as there is time for."""
+    by_line = tests_by_line(path)
+    names = {one.split("|")[0] for line in lines for one in by_line.get(line, [])}
+    if not is_seen:
+        names |= tests_by_import(module)
+    ordered = sorted(names & seconds().keys(), key=lambda name: (seconds()[name], name))
+    spent = np.cumsum([seconds()[name] for name in ordered])
+    return ordered[: int(np.searchsorted(spent, BUDGET_S, side="right"))]
 
 
 class Tree(importlib.abc.MetaPathFinder, importlib.abc.Loader):
@@ -133,47 +150,40 @@ class Tree(importlib.abc.MetaPathFinder, importlib.abc.Loader):
         exec(compile(self.tree, self.path, "exec"), module.__dict__)
 
 
-def run(tests: tuple[Path, ...], tree: Tree | None, limit_s: int) -> None:
-    """Run tests, with another tree of one module if told; the exit code says whether they pass."""
+def run(tests: list[str], tree: Tree, limit_s: int) -> None:
+    """Run tests with another tree of one module; the exit code says whether they pass."""
     resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s + 1))
     with tempfile.TemporaryDirectory() as folder:
-        if tree:
-            sys.meta_path.insert(0, tree)
-            if "njit" in tree.path.read_text():  # what was compiled before knows of no fault
-                os.environ["NUMBA_CACHE_DIR"] = folder
-                numba.config.reload_config()
+        sys.meta_path.insert(0, tree)
+        if "njit" in tree.path.read_text():  # what was compiled before knows of no fault
+            os.environ["NUMBA_CACHE_DIR"] = folder
+            numba.config.reload_config()
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         options = ["-x", "-q", "-n", "0", "-p", "no:cacheprovider", f"--basetemp={folder}/tests"]
-        sys.exit(int(pytest.main([*options, *map(str, tests)])))
+        sys.exit(int(pytest.main([*options, *tests])))
 
 
-def exit_code(tests: tuple[Path, ...], tree: Tree | None, limit_s: float) -> int | None:
-    """How tests end in a child of this process; None if they are far from it at the limit."""
-    child = multiprocessing.get_context("fork").Process(
-        target=run, args=(tests, tree, int(limit_s))
-    )
+def is_noticed(tests: list[str], tree: Tree) -> bool:
+    """Whether one of the tests fails, or finds no end, in a child of this process."""
+    limit_s = 60 + 3 * int(sum(seconds()[name] for name in tests))
+    child = multiprocessing.get_context("fork").Process(target=run, args=(tests, tree, limit_s))
     child.start()
     child.join(WAIT * limit_s)
-    alive = child.is_alive()
     child.kill()
     child.join()
-    return None if alive or child.exitcode == -signal.SIGXCPU else child.exitcode
+    if child.exitcode in (pytest.ExitCode.USAGE_ERROR, pytest.ExitCode.NO_TESTS_COLLECTED):
+        sys.exit(f"pytest does not know {tests}: run `make coverage` anew")
+    return child.exitcode != 0
 
 
-def noticed(module: str, tree: Tree) -> bool:
-    """Whether a test of a module fails, or finds no end."""
-    left_s = float(BUDGET_S)
-    for some in tests_of(module):
-        taken = []
-        for test in sorted(some, key=without_fault_s):
-            if without_fault_s(test) > left_s:
-                break
-            taken.append(test)
-            left_s -= without_fault_s(test)
-        limit_s = 30 + 2 * sum(map(without_fault_s, taken))
-        if taken and exit_code(tuple(taken), tree, limit_s) != 0:
-            return True
-    return False
+def seen(tree: ast.Module) -> set[int]:
+    """Lines of functions that do not run compiled."""
+    found: set[int] = set()
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    for node in functions:
+        if not any("jit" in ast.unparse(one) for one in node.decorator_list):
+            found |= set(range(node.body[0].lineno, (node.end_lineno or node.lineno) + 1))
+    return found
 
 
 def main() -> None:
@@ -197,7 +207,9 @@ def main() -> None:
         module = ".".join(path.relative_to(SCRIPTS).with_suffix("").parts)
         before = ast.unparse(line).splitlines()[0]
         old = put(owner, name, k, new)
-        found = noticed(module, Tree(module, path, trees[path]))
+        lines = range(line.lineno, line.end_lineno + 1)
+        tests = tests_of(module, path, lines, line.lineno in seen(trees[path]))
+        found = bool(tests) and is_noticed(tests, Tree(module, path, trees[path]))
         after = ast.unparse(line).splitlines()[0]
         put(owner, name, k, old)
         why = "" if found else known.get((module, before, after), "")
