@@ -8,15 +8,16 @@ the share of the sun's disc that sensors see at the times of the default run. Er
 this share; partial shade is where the true share lies between 5 % and 95 %. Constants of surfels
 were chosen on trees of other seeds (docs/data/surfels.csv). Rows of other steps stay in the table.
 
-With `--angles` the small tree of the stability map is rebuilt with leaves that lie flat or stand,
-and the area of discs beside leaves of each inclination is compared with that of these leaves.
+With `--angles` small trees as on the stability map are rebuilt with leaves that lie flat or stand,
+and the area of discs beside leaves of each inclination is compared with that of these leaves. Rows
+are means over six trees, with the lowest and the highest of them.
 """
 
 import argparse
 import sys
 import time
 from collections.abc import Iterator
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -49,6 +50,7 @@ TOLERANCE, MOST_RAYS = 0.01, 4096
 LIT, SHADED = 0.95, 0.05
 ANGLES = ("spherical", "uniform", "plagiophile", "erectophile", "planophile")
 INCLINATIONS_DEG = (0, 15, 30, 45, 60, 90)
+TREES = range(6)
 
 
 def main() -> None:
@@ -59,10 +61,12 @@ def main() -> None:
     parser.add_argument("--angles", action="store_true")
     options = parser.parse_args()
     if options.angles:
-        rows = pd.DataFrame([row for angles in ANGLES for row in by_inclination(angles)])
+        cases = product(ANGLES, TREES)
+        rows = pd.DataFrame([row for case in cases for row in by_inclination(*case)])
+        table = over_trees(rows)
         path = options.docs / "data" / "surfels_angles.csv"
-        rows.to_csv(path, index=False, float_format="%.4g")
-        print(rows.to_string())
+        table.to_csv(path, index=False, float_format="%.4g")
+        print(table.to_string())
         return
     settings = Settings(seed=options.seed)
     plant = apple_tree(**settings.plant.model_dump(), seed=stream_seed(options.seed, "plant"))
@@ -127,9 +131,10 @@ def rebuilt(true: dict[str, Mesh], step_deg: float, settings: Settings) -> Itera
         yield {"reconstruction": "true leaves", "meshes": meshes, "cpu_s": 0.0}
 
 
-def by_inclination(angles: str) -> Iterator[dict]:
+def by_inclination(angles: str, tree: int) -> Iterator[dict]:
     """Area of surfels over that of the true leaves, by the leaves' inclination and of all."""
     settings = Settings.model_validate(yaml.safe_load(STABILITY.read_text()))
+    settings = settings.model_copy(update={"seed": settings.seed + tree})
     plant = settings.plant.model_dump() | {"leaf_angle_distribution": angles}
     plant = apple_tree(**plant, seed=stream_seed(settings.seed, "plant"))
     true = {"leaf": plant.leaves, "wood": plant.wood}
@@ -159,6 +164,18 @@ def by_inclination(angles: str) -> Iterator[dict]:
             "found": of_found_m2 / of_true_m2,
             "edge_on_share": facts["edge_on_share"] if name == "all" else np.nan,
         }
+
+
+def over_trees(rows: pd.DataFrame) -> pd.DataFrame:
+    """Means over trees, and the lowest and the highest of what is found."""
+    groups = rows.groupby(["inclination_deg", "leaf_angles"], sort=False)
+    spread = {
+        f"{name}_{end}": (name, how)
+        for name in ("found", "edge_on_share")
+        for end, how in (("low", "min"), ("high", "max"))
+    }
+    means = {name: (name, "mean") for name in ("true_m2", "found", "edge_on_share")}
+    return groups.agg(trees=("true_m2", "size"), **means, **spread).reset_index()
 
 
 def classified(path: Path, settings: Settings) -> clouds.Cloud:

@@ -1,8 +1,8 @@
 """Rebuild leaves as discs on local surfaces, opened where shots passed."""
 
-from dapple import steps
+from dapple import findings, steps
 from dapple.formats import clouds, json, meshes, shots
-from dapple.structure import summary
+from dapple.structure import summary, surfels
 from dapple.workflow import options, run
 
 
@@ -11,6 +11,7 @@ def main(snakemake):
     cloud = clouds.read(inputs.cloud)
     fired = shots.iterate(inputs.shots) if inputs.shots else None
     leaves, facts = steps.surfels(cloud, fired, **options(snakemake.params))
+    findings.say(surfels.doubts(facts, inputs.cloud))
     print(f"{leaves.n_elements:,} discs, {leaves.area_m2:.2f} m²")
     meshes.write_ply(outputs.leaves, leaves, cloud.origin_m)
     truth = json.read(inputs.truth) if inputs.truth else None

@@ -171,6 +171,13 @@ def test_a_sheet_that_is_seen_at_grazing_angles_alone_is_told_to_be_edge_on():
     )
     assert above["edge_on_share"] < 0.02
     assert beside["edge_on_share"] > 0.95
+    assert surfels.doubts(above, "tree.laz") == []
+    (doubt,) = surfels.doubts(beside, "tree.laz")
+    assert "scan from above" in doubt.remedy
+
+
+def test_without_shots_nobody_knows_how_leaves_were_seen():
+    assert surfels.doubts(rebuilt(sheet())[1], "tree.laz") == []
 
 
 def test_points_alone_have_discs_turned_by_chance():
