@@ -8,7 +8,7 @@ import pytest
 from dapple.cloud import branches, eigenvalues
 from dapple.cloud.auto import chosen
 from dapple.cloud.classifiers import CLASSIFIERS
-from dapple.cloud.classify import classify, codes, majority
+from dapple.cloud.classify import classify, codes, doubts, majority
 from dapple.cloud.clean import thin
 from dapple.cloud.geometry import by_geometry
 from dapple.cloud.reflectance import NotSeparableWarning, by_reflectance, find_threshold
@@ -72,6 +72,17 @@ def test_dark_points_are_leaf_and_the_threshold_itself_is_leaf():
 def test_a_point_without_reflectance_is_an_error():
     with pytest.raises(InputError, match="1 points without a value"):
         by_reflectance([-9.0, np.nan])
+
+
+@pytest.mark.parametrize(("leaves_db", "is_doubted"), [(-8.0, False), (-4.0, True)])
+def test_leaves_that_are_brighter_than_the_threshold_are_doubted(leaves_db, is_doubted):
+    """A fifth of the points are bark."""
+    db = two_normals((leaves_db, 0.8), (-2.0, 0.8), share_dark=0.8, n=2000)
+    places_m = np.random.default_rng(1).uniform(0, 5, (len(db), 3))
+    cloud = Cloud(places_m, np.zeros(3), {"Reflectance": db})
+    _, facts = classify(cloud, "auto", threshold_db=-5.4)
+    found = doubts(facts, -5.4, "tree.laz")
+    assert [one.yaml for one in found] == ["classify:\n  method: learned"] * is_doubted
 
 
 def test_equal_normals_part_in_the_middle():
