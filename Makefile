@@ -5,6 +5,9 @@ BIN := .venv/bin
 
 .PHONY: run quick test test-all setup lint format docs site lock coverage peers reproduce hooks
 
+# Tests run side by side: threads of one would wait for those of another.
+quick test test-all coverage: export OPENBLAS_NUM_THREADS := 1
+
 run: setup
 	$(BIN)/snakemake --cores $(CORES)
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
+from threadpoolctl import threadpool_limits
 
 from dapple.frames import direction_from_angles
 from dapple.optics import sensor_response
@@ -235,9 +236,10 @@ def _straight(sky_seen: np.ndarray, radiance: np.ndarray, response: Response) ->
     n_patches = sky_seen.shape[2]
     weight = radiance * patches(n_patches).seen_solid_angle_sr(response)
     light = np.empty((*sky_seen.shape[:2], len(radiance)))
-    for found, seen in zip(light, sky_seen, strict=True):
-        # One product of matrices each: much faster than a stack, and the same whatever its height.
-        np.matmul(seen.astype(np.float64), weight.T, out=found)
+    with _one_thread():
+        for found, seen in zip(light, sky_seen, strict=True):
+            # One product of matrices each: much faster than a stack, and the same for any height.
+            np.matmul(seen.astype(np.float64), weight.T, out=found)
     return light
 
 
@@ -261,8 +263,9 @@ def scattered(transport: Transport, radiance: np.ndarray, optics: Optics) -> np.
     result = np.zeros((*transport.sky_seen.shape[:2], len(radiance), len(optics)))
     kinds, pieces = _by_kind(transport, radiance)
     factor = transport.counters.spectral_factor(kinds, optics)
-    for sensor, mine, light in pieces:
-        result[sensor] = np.einsum("rkt,kb->rtb", light, factor[mine], optimize=True)
+    with _one_thread():
+        for sensor, mine, light in pieces:
+            result[sensor] = np.einsum("rkt,kb->rtb", light, factor[mine], optimize=True)
     return result
 
 
@@ -286,9 +289,16 @@ def summed_scattered(
     result = np.zeros((*transport.sky_seen.shape[:2], len(radiance)))
     kinds, pieces = _by_kind(transport, radiance)
     factor = transport.counters.spectral_factor(kinds, optics)
-    for sensor, mine, light in pieces:
-        result[sensor] = np.einsum("rkt,kt->rt", light, factor[mine] @ flux.T)
+    with _one_thread():
+        for sensor, mine, light in pieces:
+            result[sensor] = np.einsum("rkt,kt->rt", light, factor[mine] @ flux.T)
     return result
+
+
+def _one_thread() -> threadpool_limits:
+    """Small products of matrices, one a sensor: threads would wait for each other, most of all on a
+    machine with other work, and take ten times as long."""
+    return threadpool_limits(1, "blas")
 
 
 def _by_kind(transport: Transport, radiance: np.ndarray):
