@@ -84,7 +84,8 @@ def write(path: Path, table: pd.DataFrame, edge_m: float) -> None:
     print(table.to_string(index=False))
     if path.exists():
         former = tables.read(path)
-        table = pd.concat([former[former["edge_m"] != edge_m], table], ignore_index=True)
+        table = pd.concat([former[former["edge_m"] != edge_m], table])
+        table = table.sort_values("edge_m", kind="stable")
     tables.write(path, table)
 
 

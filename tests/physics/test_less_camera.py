@@ -86,7 +86,18 @@ def test_like_grounds_are_one_and_needles_stay_as_they_are():
         np.concatenate([np.zeros_like(ground), needle]),
         np.arange(301),
     )
-    used = less_camera.few(materials, seed=1, most=3)
+    used = less_camera.few(materials, np.ones(301), seed=1, most=3)
     assert len(used.reflectance) == 4
     shown = used.reflectance[used.of_face]
     assert shown == pytest.approx(materials.reflectance, abs=2e-6)
+
+
+def test_bark_keeps_its_colour_among_thousands_of_patches_of_ground():
+    ground = np.random.default_rng(3).random((300, 2))
+    bark = np.array([[0.1, 0.5]])
+    opaque = np.concatenate([bark, ground])
+    materials = Materials(opaque, np.zeros_like(opaque), np.arange(301))
+    area_m2 = np.r_[50.0, np.ones(300)]
+    used = less_camera.few(materials, area_m2, seed=1, most=8)
+    assert len(used.reflectance) == 9
+    assert used.reflectance[used.of_face[0]] == pytest.approx(bark[0])

@@ -35,9 +35,10 @@ def main(folder: Path) -> None:
     bands = facts["wavelength_nm"]
     scene = less.Scene()
     scene.size = tuple(facts["size_m"])
-    # The world brings its own ground; what lies around and below it is dark.
+    # The world brings its own ground, and dark ground around it; what lies below is dark too.
     scene.terrain = less.Terrain(property=less.Lambertian(reflectance=0.0))
     world = less.Object("world", mesh=str(folder / "world.obj"))
+    world.set_property("dark", less.Lambertian(reflectance=0.0))
     pairs = zip(facts["reflectance"], facts["transmittance"], strict=True)
     for number, (reflectance, transmittance) in enumerate(pairs):
         world.set_property(
