@@ -61,6 +61,24 @@ def test_the_more_aerosol_the_more_of_the_light_comes_from_the_sky():
     assert (np.diff(found, axis=0) > 0).all()
 
 
+def test_bands_of_cameras_are_those_of_their_data_sheets():
+    """Centre and full width at half maximum [nm], as their makers and ESA (S2A) state them."""
+    stated = {
+        "p4m": "450/32 560/32 650/32 730/32 840/52",
+        "mavic3m": "560/32 650/32 730/32 860/52",
+        "rededge-m": "475/20 560/20 668/10 717/10 840/40",
+        "rededge-mx": "475/32 560/27 668/14 717/12 842/57",
+        "altum": "475/32 560/27 668/14 717/12 842/57",
+        "sequoia": "550/40 660/40 735/10 790/40",
+        "sentinel-2": "492/66 560/36 665/31 704/15 740/15 783/20 833/106",
+    }
+    told = {
+        name: " ".join(f"{band.centre_nm:g}/{band.width_nm:g}" for band in one)
+        for name, one in CAMERAS.items()
+    }
+    assert told == stated
+
+
 @pytest.mark.parametrize("name", CAMERAS)
 def test_a_camera_tells_sunlit_leaves_and_its_bands_ascend(name):
     centres = [band.centre_nm for band in CAMERAS[name]]

@@ -301,6 +301,15 @@ def test_another_clock_is_found_with_the_offset_to_declare(ahead_min, offset):
         stop(plausible.check(wrong, FREIBURG))
 
 
+@pytest.mark.parametrize("longitude_deg", [-123.0, -78.0, 8.0, 147.0])
+def test_a_clock_that_is_ahead_is_found_at_any_longitude(longitude_deg):
+    site = sun.Site(40.0, longitude_deg, 100.0)
+    truth = minutes(5, start="2023-08-01", site=site, clouds=False)
+    found = radiation_clock.offset(station(truth, 10, "end", ahead_min=60), site)
+    assert found is not None
+    assert found.minutes == pytest.approx(-60.0, abs=2.0)
+
+
 @pytest.mark.parametrize("hours", [-10, -5, 3, 8, 11])
 def test_another_clock_is_found_under_the_midnight_sun(hours):
     site, _ = STATIONS["Tromsø"]
