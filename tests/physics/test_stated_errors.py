@@ -33,3 +33,9 @@ def test_deviations_over_stated_errors_have_a_spread_of_one(kind):
     assert (scatter / error).std() == pytest.approx(1, abs=0.15)
     stated, actual = (np.sqrt(np.mean(np.square(x))) for x in (error, scatter))
     assert stated == pytest.approx(actual, rel=0.25)
+
+
+def test_four_times_as_many_rays_promise_half_the_error():
+    finer = TRACING.finer(4)
+    assert (finer.paths, finer.sky_rays, finer.max_shadow_rays) == (4096, 9280, 32_768)
+    assert finer.tolerance == pytest.approx(0.005)

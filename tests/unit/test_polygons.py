@@ -37,6 +37,16 @@ def test_a_flat_square_leaf_keeps_its_area_and_its_tilt():
     assert mesh.element_normal[0, 2] > 0
 
 
+def test_a_polygon_lies_in_the_plane_of_least_squares_of_its_points():
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        spread = rng.standard_normal((3, 3)) * [0.012, 0.008, 0.002]
+        points_m = 0.05 + (rng.uniform(-1, 1, (30, 3)) @ spread).clip(-0.049, 0.049)
+        mesh = reconstruct(points_m, voxel_size_m=0.10, buffer_m=0.0, seed=1)
+        least = np.linalg.svd(points_m - points_m.mean(axis=0))[2][2]
+        assert abs(mesh.element_normal[0] @ least) == pytest.approx(1.0, abs=1e-9)
+
+
 def test_a_buffer_of_half_the_spacing_gives_each_point_its_own_area():
     points = square(0.04, tilt_deg=20, spacing_m=0.01)  # 25 points, each stands for 1 cm²
     mesh = reconstruct(points, voxel_size_m=0.10, buffer_m=0.005, seed=1)
