@@ -199,6 +199,12 @@ def test_a_blue_sky_is_bluer_than_the_sun_and_an_overcast_sky_is_not():
     assert blue["overcast"] < 1.2 * blue["sun"]
 
 
+def test_the_less_of_the_sun_clouds_let_through_the_less_of_the_sky_is_blue():
+    none, some, more = (spectrum(watts, 500.0, par_bands())[1] for watts in (0.0, 100.0, 200.0))
+    assert more - none == pytest.approx(2 * (some - none))
+    assert (some - none)[0, :20].sum() > 0.1
+
+
 # --- sky ------------------------------------------------------------------------------------
 
 
