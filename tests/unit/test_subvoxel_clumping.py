@@ -42,6 +42,16 @@ def test_a_half_filled_voxel_has_the_mean_transmittance_of_its_halves():
     assert across < U
 
 
+def test_leaves_that_lie_flat_are_seen_less_from_the_side_than_from_above():
+    """Planophile leaves in the lower half: only beams from the side see both halves apart."""
+    coarse, fine = half_filled()
+    lower = fine.rename(x="z", z="x").transpose(*DIMS)
+    level = coarse.assign_attrs(leaf_angle_distribution="planophile")
+    ahead = 8 / (3 * np.pi**2)  # projection of planophile leaves on a level beam; 8/(3π) from above
+    across = -np.log(0.5 * (1 + np.exp(-ahead * 2 * U))) / ahead
+    assert effective_density(level, lower).item() == pytest.approx((U + 2 * across) / 3, rel=1e-3)
+
+
 def test_small_clumps_are_even_at_last():
     """The finer the clumps, the nearer the effective density comes to the mean."""
     found = []
