@@ -66,7 +66,7 @@ def test_a_record_over_an_interval_is_held_against_the_mean_of_the_light_in_it()
 
 def test_intervals_that_reach_beyond_the_simulated_times_are_left_out():
     simulated = light([[0, 60, 120, 180, 240]], step_s=60)
-    found = pair(simulated, records("1_1", [-30, 30, 210, 270], 60), reconstruction="x")
+    found = pair(simulated, records("1_1", [-30, 30, 210, 211, 270], 60), reconstruction="x")
     assert found["simulated"].tolist() == pytest.approx([30.0, 210.0])
 
 

@@ -125,6 +125,17 @@ def test_outside_and_in_gaps_of_a_table_the_model_joins_without_a_step(tmp_path)
     assert (got["global_w_m2"] - np.interp(minute, [70, 240], [705, 600])).iloc[155] > 20
 
 
+def test_weather_goes_over_from_the_last_row_before_a_gap_to_the_first_one_after_it(tmp_path):
+    rows = "2023-08-10 11:00,700,120\n"
+    rows += "".join(f"2023-08-10 14:{minute},200,180\n" for minute in ("00", "10", "20"))
+    times = time_range("2023-08-10 11:00", "2023-08-10 14:00", 5, "UTC")
+    got = at(table_file(tmp_path, rows), times)["global_w_m2"]
+    share = (got / sun.clear_sky(times, FREIBURG)["global_w_m2"]).to_numpy()
+    assert share[1] == pytest.approx(share[0], rel=0.1)
+    assert share[-2] == pytest.approx(share[-1], rel=0.1)
+    assert 1.2 * share[-1] < share[len(share) // 2] < share[0] / 1.2
+
+
 @pytest.mark.parametrize(
     "rows",
     [
@@ -335,6 +346,18 @@ def test_light_at_night_is_another_zone_whatever_the_weather():
     wrong = station(truth, 10, "end", ahead_min=-300)
     with pytest.raises(InputError, match="below the horizon"):
         stop(plausible.check(wrong, FREIBURG))
+
+
+def test_sun_at_too_little_light_is_another_unit_where_clouds_come_every_other_hour():
+    truth = minutes(6, clouds=False)
+    is_cloudy = truth.index.hour % 2 == 0
+    truth.loc[is_cloudy, "global_w_m2"] *= 0.3
+    truth.loc[is_cloudy, "diffuse_w_m2"] = truth["global_w_m2"]
+    right = plausible.check(station(truth, 60, "start"), FREIBURG)
+    assert [one.level for one in right] == ["warning"]  # too few clear hours tell the unit
+    wrong = plausible.check(station(truth, 60, "start", factor=0.36), FREIBURG)
+    assert "on the best day" in wrong[0].found
+    assert wrong[0].level == "error"
 
 
 def test_columns_that_are_exchanged_are_named():
