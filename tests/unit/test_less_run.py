@@ -45,16 +45,15 @@ def test_a_sun_without_a_disc_is_one_point_and_seeds_turn_the_others():
 
 
 def test_pixels_of_a_square_image_count_by_their_part_of_the_disc():
-    middle, n = less_run.PIXELS // 2, less_run.PIXELS
-    weight = less_run.in_disc().reshape(n, n)
+    weight = less_run.in_disc().reshape(less_run.PIXELS, less_run.PIXELS)
     assert weight.sum() == pytest.approx(1.0)
     np.testing.assert_allclose(weight, weight.T)
     np.testing.assert_allclose(weight, weight[::-1])
-    whole = 1 / (np.pi / 4) / n**2
-    assert weight[middle, middle] == pytest.approx(whole, rel=1e-3)
+    whole = 1 / (np.pi / 4) / less_run.PIXELS**2
+    assert weight[3, 3] == pytest.approx(whole, rel=1e-3)
     # The edge of the disc meets the outermost pixels alone in their inner corner.
     assert weight[0, 0] == 0.0
-    assert 0.0 < weight[0, 3 * n // 8] < whole
+    assert 0.0 < weight[0, 3] < whole
 
 
 def test_the_mean_of_pixels_errs_by_their_errors_together():

@@ -24,9 +24,8 @@ from typing import Any
 import less
 import numpy as np
 
-PIXELS = 32
-"""Of an edge of a sensor's image; their spread is the error of the mean. Pixels at the rim of the
-disc see beyond it: of 8, sensors at the edge of a shadow were up to 1.4 % of the open sky off."""
+PIXELS = 8
+"""Of an edge of a sensor's image; their spread is the error of the mean."""
 ORDERS = 2
 """Of scattering that are told apart: 1 is the plate alone, what is above met something else."""
 SKY_GRID = (16, 32)
